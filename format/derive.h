@@ -1,0 +1,39 @@
+// Sections that follow from others: leaves from patches, trees from leaves, cells and distance textures from trim
+// pieces. The converter calls these to fill a pack; the loader calls the same functions on a compact pack, so both give
+// the same bytes. All are deterministic on any number of threads.
+#pragma once
+
+#include "format/pack_image.h"
+#include "format/result.h"
+
+namespace trimray {
+
+struct LeafOptions {
+    float max_turning_rad = 0.12f; // of the control polygon of a leaf, each direction
+    float max_aspect = 4.0f;       // longer side over shorter, on the surface
+    uint max_leaves_per_patch = 1024;
+};
+
+/// Fills image.leaves and the parts' leaf ranges from patches and control points. A leaf's box holds the surface over
+/// its rectangle (convex hull of its control points, rounded outwards). Source: paper eq. 1-2; Piegl & Tiller 5.3.
+void derive_leaves(PackImage& image, const LeafOptions& options);
+
+/// Fills image.part_nodes, image.top_nodes and the parts' node ranges. Reorders each part's leaves into tree order.
+void derive_trees(PackImage& image);
+
+/// Fills image.cells, image.cell_entries and the faces' grids from trim points and pieces (pack_layout.h, CellEntry).
+void derive_cells(PackImage& image);
+
+/// Fills image.sdf_words from trim points, pieces and each face's sdf_size (set by allocate_trim_memory).
+void derive_sdf(PackImage& image);
+
+enum class TrimLayout { Isotropic, Square };
+
+/// Sets each trimmed face's sdf_size so that the textures take about total_bytes: M_i = ceil(M_total A_i / sum A),
+/// H_i = floor(sqrt(M_i)) (paper eq. 4, 5) in the square layout; the isotropic one has equal texels on the surface.
+void allocate_trim_memory(PackImage& image, double total_bytes, TrimLayout layout);
+
+/// Bytes the model's trims take in the kd-tree baseline, the unit of `--trim-memory 50%`.
+double kd_trim_bytes(const PackImage& image);
+
+} // namespace trimray

@@ -1,0 +1,58 @@
+// PackImage: everything a pack holds, in memory, as plain arrays. The converter fills one, pack_writer turns it into
+// bytes; pack_reader turns bytes into a PackView, the same arrays as read-only spans.
+#pragma once
+
+#include "format/pack_layout.h"
+
+#include <cstddef>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace trimray {
+
+/// Strings by index; index 0 is the empty string. UTF-8. Equal strings share an index.
+struct StringTable {
+    std::vector<std::string> strings{""};
+    uint add(std::string_view s); // index of s, appended if new
+};
+
+struct Provenance {
+    std::string source_name;       // file name without its folder
+    std::string source_format;     // "STEP AP214", "IGES 5.3", "BREP"
+    std::string source_unit;       // "MM", "INCH", "M": what the file says; the pack is in millimetres
+    std::string source_sha_or_xxh; // content hash of the source, "xxh3:<16 hex digits>"
+    std::string tool_version;
+    std::string options_json;
+};
+
+struct PackImage {
+    std::vector<PartRecord> parts;
+    std::vector<InstanceRecord> instances;
+    std::vector<TreeNode> tree;
+    std::vector<FaceRecord> faces;
+    std::vector<PatchRecord> patches;
+    std::vector<float> control_points;
+    std::vector<LeafRecord> leaves;
+    std::vector<BvhNode> top_nodes;  // over instances, world mm relative to world_origin_mm / world_scale_mm
+    std::vector<BvhNode> part_nodes; // all parts' trees, in part units
+    std::vector<float> trim_points;  // u, v pairs, uv_face
+    std::vector<uint> trim_pieces;
+    std::vector<uint> cells;
+    std::vector<CellEntry> cell_entries;
+    std::vector<uint> sdf_words;
+    std::vector<DroppedFace> dropped;
+    StringTable strings;
+    Provenance provenance;
+    double bounds_lo_mm[3] = {0, 0, 0}; // world, of all instances
+    double bounds_hi_mm[3] = {0, 0, 0};
+    double world_origin_mm[3] = {0, 0, 0}; // of the top tree's unit space
+    double world_scale_mm = 1;
+    bool compact = false; // leaves, nodes, cells, textures are left out and rebuilt at load
+    std::vector<std::byte> preview_256_png;
+    std::vector<std::byte> preview_512_png;
+    std::vector<std::byte> proxy_draco; // coarse triangles of all parts, see SPEC.md
+};
+
+} // namespace trimray

@@ -1,0 +1,211 @@
+// The records of a pack, declared once for C++ and GLSL (scalar block layout, 4-byte fields, padding named).
+// What each field means is part of the file format: format/SPEC.md repeats it in words and tables.
+//
+// Spaces, from the outside in (every point exists in one of these, and names say which):
+//   world     millimetres, after the instance's transform
+//   part      millimetres in the part's own axes; part units: p_mm = part.origin_mm + part.scale_mm * p, |p| <= 1
+//   patch     p = origin + scale * (axis_x * q.x + axis_y * q.y + axis_z * q.z), |q| about 1; all the tracers compute
+//   in it uv_file   the surface's own parameters (mm, radians, knots), as in the CAD file uv_face   [0,1]^2: the
+//   bounding rectangle of the face's trim loops ("domain") uv_patch  [0,1]^2 of a Bezier patch; for native kinds the
+//   local parameters (lengths in patch units, angles in radians)
+#ifndef TRIMRAY_PACK_LAYOUT_H
+#define TRIMRAY_PACK_LAYOUT_H
+
+#ifdef __cplusplus
+#include <cstddef>
+#include <cstdint>
+namespace trimray {
+using uint = std::uint32_t;
+#define TRIMRAY_CONST inline constexpr
+#else
+#define TRIMRAY_CONST const
+#endif
+
+// ---- surface kinds -------------------------------------------------------------------------------------------------
+// Native parametrisations, in patch space (radius and the like are in patch units, param[] below):
+//   plane     S(u,v) = (u, v, 0)
+//   cylinder  S(u,v) = (r cos u, r sin u, v)                                        r = param[0]
+//   cone      S(u,v) = ((r + v sin a) cos u, (r + v sin a) sin u, v cos a)          r = param[0], tan a = param[1]
+//   sphere    S(u,v) = (r cos v cos u, r cos v sin u, r sin v)                      r = param[0]
+//   torus     S(u,v) = ((R + r cos v) cos u, (R + r cos v) sin u, r sin v)          R = param[0], r = param[1]
+// axis_y is stored, not derived: in a left-handed axis system axis_y = axis_x x axis_z.
+// The axes are turned so that u = 0 is the middle of the face's domain (torus: v too), so an angle in (-pi, pi]
+// maps to uv_face without unwrapping.
+TRIMRAY_CONST uint kKindPlane = 0u;
+TRIMRAY_CONST uint kKindCylinder = 1u;
+TRIMRAY_CONST uint kKindCone = 2u;
+TRIMRAY_CONST uint kKindSphere = 3u;
+TRIMRAY_CONST uint kKindTorus = 4u;
+TRIMRAY_CONST uint kKindBezier = 5u; // polynomial or rational: PatchRecord.shape says which
+TRIMRAY_CONST uint kSurfaceKindCount = 6u;
+
+// PatchRecord.shape = kind | degree_u << 8 | degree_v << 16 | rational << 24
+TRIMRAY_CONST uint kShapeRational = 1u << 24;
+TRIMRAY_CONST uint kMaxDegree = 25u; // the kernel's own limit
+
+// FaceRecord.flags
+TRIMRAY_CONST uint kFaceReversed = 1u;      // outward normal is -(S_u x S_v)
+TRIMRAY_CONST uint kFaceNaturalBorder = 2u; // the domain rectangle is the trim: no cells, no texture
+TRIMRAY_CONST uint kFaceHasColor = 4u;      // else the instance's colour
+TRIMRAY_CONST uint kFaceApproximated = 8u;  // surface converted with a deviation, see deviation_mm
+TRIMRAY_CONST uint kFaceOpenLoop = 16u;     // a loop did not close within tolerance and was closed by a segment
+
+// A patch: one native surface, or one Bezier patch, of one face.
+struct PatchRecord {
+    float origin_hi[3]; // part units; origin = hi + lo, together 48 bits
+    float origin_lo[3];
+    float scale; // patch units to part units
+    uint face;
+    uint shape;
+    uint first_control_point; // Bezier: first float of the control net in the control-point array, v runs fastest:
+                              // polynomial (x, y, z), rational (wx, wy, wz, w), w > 0, patch units. Native: 0
+    float uv_offset[2];       // uv_face = uv_offset + uv_scale * uv_patch
+    float uv_scale[2];
+    float axis_x[3]; // unit, orthogonal; Bezier: the identity
+    float axis_y[3];
+    float axis_z[3];
+    float param[2];
+};
+
+// A leaf: a rectangle of a patch and the oriented box around it. Native faces have one leaf or a few, with uv = [0,1]^2
+// standing for the whole domain in uv_face.
+struct LeafRecord {
+    uint patch;
+    uint uv_lo; // u | v << 16, each k / 32768, exact; Bezier: uv_patch, native: uv_face
+    uint uv_hi;
+    uint center_xy;       // int16 x | int16 y << 16; center = k / 16384, patch units
+    uint center_z_half_x; // int16 | uint16 << 16; half extent = k / 16384
+    uint half_yz;         // uint16 | uint16 << 16
+    uint quat_xy;         // int16 each, k / 32767; w = sqrt(1 - x^2 - y^2 - z^2) >= 0 (see decode in shaders/shared)
+    uint quat_z_flags;    // int16 z | flags << 16 (kLeafFlagged: not certified to hold one hit a ray)
+};
+TRIMRAY_CONST uint kLeafFlagged = 1u;
+TRIMRAY_CONST float kLeafQuantum = 1.0f / 16384.0f;
+TRIMRAY_CONST float kLeafUvQuantum = 1.0f / 32768.0f;
+
+// A node of a 4-wide tree with boxes quantised against the node's own: child box = origin + exp2(exponent) * q.
+struct BvhNode {
+    float origin[3];
+    uint exponents; // x | y << 8 | z << 16, biased by 127 as in a float; child count << 24
+    uint lo[3];     // per axis, 4 children x 8 bits
+    uint hi[3];
+    uint child[4];    // node index, or kBvhLeaf | leaf index (instance index in the top tree), or kBvhEmpty
+    uint reserved[2]; // zero
+};
+TRIMRAY_CONST uint kBvhLeaf = 0x80000000u;
+TRIMRAY_CONST uint kBvhEmpty = 0xffffffffu;
+TRIMRAY_CONST uint kMaxBvhDepth = 48u; // nodes on a path from root to leaf; a reader refuses deeper trees
+
+// ---- trims ---------------------------------------------------------------------------------------------------------
+// Loops are chains of control points in uv_face. A piece is monotone in u and in v: a line (2 points) or a polynomial
+// cubic Bezier (4 points); consecutive pieces of a loop share their end point, bit for bit. Fill rule: even-odd.
+// TrimPiece word = first point (relative to the face's first_point) << 2 | kPieceCubic.
+TRIMRAY_CONST uint kPieceCubic = 1u;
+TRIMRAY_CONST uint kEntryLast = 2u; // in a CellEntry's word: last of its cell
+
+// CellEntry: a piece that passes through a mixed cell. Query q = (u, v) in a cell of grid index floor(uv * grid):
+//   inside = corner_inside  XOR over the cell's entries of  horizontal(e)  XOR  vertical(e)
+//   with piece ends (ua, va), (ub, vb), va <= vb; the path runs from q along +u to the cell's reference line, then
+//   along +v to the reference corner; eta is where the piece crosses the reference line beside the cell, or kNoEta:
+//   vertical(e)   = eta != kNoEta and v < eta
+//   horizontal(e) = va <= v < vb and u < P(v) and (eta == kNoEta or (u grows with v along the piece ? v < eta : v >=
+//   eta)) where u < P(v) is true for u < min(ua, ub), false for u >= max(ua, ub), else decided by solving P_v(t) = v.
+struct CellEntry {
+    uint word;
+    float eta;
+};
+TRIMRAY_CONST float kNoEta = -1.0f;
+
+// Cell word: class (2 bits) | first entry, relative to the face's first_entry, << 2
+TRIMRAY_CONST uint kCellOut = 0u;
+TRIMRAY_CONST uint kCellIn = 1u;
+TRIMRAY_CONST uint kCellMixedCornerOut = 2u;
+TRIMRAY_CONST uint kCellMixedCornerIn = 3u;
+
+// Distance texel: 8 bits b, distance = (b - 128) / 32 texels, positive inside; 4 texels of a row in one word, rows
+// padded to whole words; texel centres at (i + 0.5) / width. One texel's length is the longer of the two on the surface
+// (square layout) or the same in u and v (isotropic layout).
+TRIMRAY_CONST float kSdfTexelQuantum = 1.0f / 32.0f;
+
+struct FaceRecord {
+    uint part;
+    uint name;       // string index, 0: none
+    uint color_rgba; // sRGB, R in the low byte
+    uint flags;
+    uint first_patch;
+    uint patch_count;
+    uint grid;       // cells: columns (u) | rows (v) << 16; 0: no cells
+    uint first_cell; // row-major, rows along v
+    uint first_entry;
+    uint entry_count;
+    uint first_point;
+    uint point_count;
+    uint first_piece;
+    uint piece_count;
+    uint sdf_size; // width | height << 16; 0: no texture
+    uint sdf_first_word;
+    float sdf_texel_mm;    // length of a texel, the unit of the stored distances
+    float sdf_band_texels; // |B| above this decides; see tests/hard, "the band"
+    float area_mm2;
+    float tolerance_mm; // largest tolerance of its edges in the file
+    float deviation_mm; // of an approximated surface from the file's; 0: exact
+    float extent_mm[2]; // mean length of the domain along u and v on the surface
+    uint surface_kind;  // kKind of the file's surface (kKindBezier for all splines, sweeps and offsets)
+    uint loop_count;
+    uint reserved;
+    double domain_lo[2]; // uv_file of uv_face (0,0) and (1,1)
+    double domain_hi[2];
+};
+
+#ifdef __cplusplus
+// ---- host-only records ---------------------------------------------------------------------------------------------
+/// A shape of the model, stored once however often it is placed.
+struct PartRecord {
+    double origin_mm[3];
+    double scale_mm;
+    uint name;
+    uint first_face, face_count;
+    uint first_patch, patch_count;
+    uint first_leaf, leaf_count;
+    uint first_node, node_count; // nodes of its tree; child indices are relative to first_node, leaves to first_leaf
+    uint reserved;
+};
+
+/// A placement of a part. transform is row-major 3x4, part mm to world mm; a negative determinant is a mirror image.
+struct InstanceRecord {
+    double transform[12];
+    uint part;
+    uint name;
+    uint color_rgba; // used by faces without their own colour; alpha 0: none, the default grey
+    uint tree_node;  // its node in the assembly tree
+};
+
+/// A node of the assembly tree, parents before children; the root is node 0 and its own parent.
+struct TreeNode {
+    uint parent;
+    uint name;
+    uint color_rgba;
+    uint reserved;
+};
+
+/// A face that is not in the pack, and why. `reason` is a string index.
+struct DroppedFace {
+    uint part;
+    uint face_in_part; // its number in the file's part, counted from 0 over converted and dropped faces
+    uint reason;
+    uint name;
+};
+
+static_assert(sizeof(PatchRecord) == 100 && offsetof(PatchRecord, uv_offset) == 40);
+static_assert(sizeof(LeafRecord) == 32);
+static_assert(sizeof(BvhNode) == 64);
+static_assert(sizeof(CellEntry) == 8);
+static_assert(sizeof(FaceRecord) == 136 && offsetof(FaceRecord, domain_lo) == 104);
+static_assert(sizeof(PartRecord) == 72);
+static_assert(sizeof(InstanceRecord) == 112);
+static_assert(sizeof(TreeNode) == 16);
+static_assert(sizeof(DroppedFace) == 16);
+} // namespace trimray
+#endif
+
+#endif

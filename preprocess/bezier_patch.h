@@ -1,0 +1,51 @@
+// B-spline surfaces -> Bezier patches by knot insertion, in double, and native surfaces -> patch records.
+#pragma once
+
+#include "format/pack_layout.h"
+#include "format/result.h"
+#include "preprocess/cad_model.h"
+
+#include <array>
+#include <vector>
+
+namespace trimray {
+
+/// A rational Bezier patch over `domain` in uv_file. control_points[i * (degree_v + 1) + j] = (w x, w y, w z, w), i
+/// along u.
+struct BezierPatch {
+    int degree_u = 1, degree_v = 1;
+    bool rational = false;
+    Rect2d domain;
+    std::vector<std::array<double, 4>> control_points;
+};
+
+/// Returns the patches of `surface` over `domain` (cut at its border), row by row. Zero-length spans give no patch. In
+/// periodic directions the domain may lie anywhere and is at most one period long; patches come back shifted into it.
+/// Source: Piegl & Tiller A5.6 / A5.7 (knot refinement, decomposition), eq. 1.7 for cutting.
+std::vector<BezierPatch> decompose(const CadSurface& surface, const Rect2d& domain);
+
+/// Point and first derivatives, in mm, at uv_file; for every kind. The slow, obvious form, for metrics and tests.
+struct SurfaceDerivatives {
+    Vec3d p, du, dv;
+};
+SurfaceDerivatives evaluate(const CadSurface& surface, double u, double v);
+
+/// Mean lengths in mm of the domain along u and along v, and the area in mm^2 of the domain's image.
+struct SurfaceExtent {
+    double length_u_mm = 0, length_v_mm = 0, area_mm2 = 0;
+};
+SurfaceExtent surface_extent(const CadSurface& surface, const Rect2d& domain);
+
+/// The part's unit space: p_part = (p_mm - origin_mm) / scale_mm.
+struct PartFrame {
+    Vec3d origin_mm;
+    double scale_mm = 1;
+};
+
+/// Appends the records of a face's surface over `domain`: one native patch, or its Bezier patches with their control
+/// points (pack_layout.h PatchRecord). Fails: InvalidSurface, UnsupportedSurface (weights not positive, degree above
+/// kMaxDegree).
+Status append_patches(const CadSurface& surface, const Rect2d& domain, const PartFrame& frame, uint32_t face,
+                      std::vector<PatchRecord>& patches, std::vector<float>& control_points);
+
+} // namespace trimray

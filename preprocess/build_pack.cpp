@@ -1,0 +1,1 @@
+#include "preprocess/build_pack.h"

@@ -1,0 +1,28 @@
+// Import of CAD files through OpenCASCADE's document readers. cad_import*.cpp are the only files that include its
+// headers.
+#pragma once
+
+#include "format/result.h"
+#include "preprocess/cad_model.h"
+
+#include <functional>
+#include <string>
+
+namespace trimray {
+
+struct ImportOptions {
+    bool heal = false;                     // run the kernel's shape healing: slow, off where nothing is lost without it
+    bool native_surfaces = true;           // false: every surface as a B-spline, pcurves following (--surfaces bezier)
+    double approximation_tolerance_mm = 0; // for offsets and the like; 0: 1e-6 of the part's size
+    double proxy_deflection = 0.02;        // of the proxy mesh, relative to the part's diagonal; 0: no mesh
+};
+
+/// Called with a phase's name and its share done in [0,1], or a negative share where the kernel does not tell.
+using Progress = std::function<void(const char* phase, double share)>;
+
+/// Reads a STEP, IGES or BREP file (by content, then by name). Lengths come back in millimetres.
+/// Fails: FileNotFound, FileNotReadable, InvalidCad, EmptyCad, UnsupportedFormat. The kernel may crash or hang on
+/// damaged files: callers run this in a process of its own (see worker.h).
+Result<CadModel> import_cad(const std::string& path, const ImportOptions& options, const Progress& progress);
+
+} // namespace trimray

@@ -1,0 +1,86 @@
+// The public face of the runtime: load a pack, trace it on the CPU or through Vulkan, get a frame of AOVs.
+#pragma once
+
+#include "format/pack_reader.h"
+#include "format/result.h"
+#include "runtime/camera.h"
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace trimray {
+
+/// A loaded, validated pack, ready to trace.
+struct Scene {
+    LoadedPack pack;
+    bool has_cells() const { return !pack.image.cells.empty(); }
+};
+
+Result<std::shared_ptr<const Scene>> load_scene(const std::string& path, bool previews_and_proxy = false);
+
+enum class TrimMode { Auto, Exact, Sdf, Hybrid, Kd };
+
+struct RenderOptions {
+    uint32_t width = 1280, height = 720;
+    Camera camera;
+    TrimMode trim = TrimMode::Auto;
+    uint32_t threads = 0;   // 0: all cores
+    uint32_t frames = 1;    // timed frames; the picture is the last one's
+    float error_px = 0.02f; // stop of Newton's iteration, in pixels
+    bool shade = true;      // fill rgba
+};
+
+/// Per-pixel results, row 0 at the top. A miss has depth +inf, face -1, zeros elsewhere.
+struct Frame {
+    uint32_t width = 0, height = 0;
+    std::vector<float> rgba;     // 4 a pixel, linear light, straight alpha; a miss is the background with alpha 0
+    std::vector<float> depth_mm; // distance from the eye along the ray
+    std::vector<float> normal;   // 3 a pixel, unit, world, outward as the face's orientation says
+    std::vector<float> uv;       // 2 a pixel, uv_file
+    std::vector<int32_t> face;   // index into the pack's faces
+    std::vector<int32_t> instance;
+    std::vector<uint8_t> certified;
+};
+
+/// Work done per frame, all rays together. Counts do not wobble: compare them before times.
+struct WorkCounts {
+    uint64_t rays = 0, node_visits = 0, leaf_visits = 0, newton_steps = 0, curve_tests = 0, uncertified_pixels = 0;
+};
+
+struct RenderStats {
+    std::string device;
+    std::vector<double> frame_ms; // tracing and shading, not loading or compiling
+    WorkCounts work;              // of one frame
+    TrimMode trim = TrimMode::Exact;
+};
+
+class Tracer {
+public:
+    virtual ~Tracer() = default;
+    virtual std::string device_name() const = 0;
+    virtual Result<Frame> render(const RenderOptions& options, RenderStats& stats) = 0;
+};
+
+/// Fails: UnsupportedPackFeature. `instruction_set` is "", "avx512", "avx2" or "sse2"; empty: the best this machine
+/// has.
+Result<std::unique_ptr<Tracer>> make_cpu_tracer(std::shared_ptr<const Scene> scene,
+                                                const std::string& instruction_set = "");
+
+/// Fails: NoDevice, DeviceFailed. `allow_software`: accept a software driver (`--device vulkan`; never for auto).
+Result<std::unique_ptr<Tracer>> make_vulkan_tracer(std::shared_ptr<const Scene> scene, bool allow_software,
+                                                   bool validation);
+
+/// One ray, in world mm; `direction` need not be unit, distance_mm is along the unit direction.
+struct RayHit {
+    bool hit = false;
+    double distance_mm = 0;
+    std::array<double, 3> normal{};
+    std::array<double, 2> uv{};
+    int32_t face = -1, instance = -1;
+};
+RayHit trace_ray(const Scene& scene, const std::array<double, 3>& origin_mm, const std::array<double, 3>& direction);
+
+} // namespace trimray
