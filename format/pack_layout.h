@@ -3,7 +3,7 @@
 //
 // Spaces, from the outside in (every point exists in one of these, and names say which):
 //   world     millimetres, after the instance's transform
-//   part      millimetres in the part's own axes; part units: p_mm = part.origin_mm + part.scale_mm * p, |p| <= 1
+//   part      millimetres in the part's own axes; part units: p_mm = part.origin_mm + part.scale_mm * p, |p| about 1
 //   patch     p = origin + scale * (axis_x * q.x + axis_y * q.y + axis_z * q.z), |q| about 1; all the tracers compute
 //   in it uv_file   the surface's own parameters (mm, radians, knots), as in the CAD file uv_face   [0,1]^2: the
 //   bounding rectangle of the face's trim loops ("domain") uv_patch  [0,1]^2 of a Bezier patch; for native kinds the
