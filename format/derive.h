@@ -8,12 +8,6 @@
 
 namespace trimray {
 
-struct LeafOptions {
-    float max_turning_rad = 0.12f; // of the control polygon of a leaf, each direction
-    float max_aspect = 4.0f;       // longer side over shorter, on the surface
-    uint max_leaves_per_patch = 1024;
-};
-
 /// Fills image.leaves and the parts' leaf ranges from patches and control points. A leaf's box holds the surface over
 /// its rectangle (convex hull of its control points, rounded outwards). Source: paper eq. 1-2; Piegl & Tiller 5.3.
 void derive_leaves(PackImage& image, const LeafOptions& options);

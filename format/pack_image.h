@@ -27,6 +27,13 @@ struct Provenance {
     std::string options_json;
 };
 
+/// How patches are cut into leaves. Part of the pack, so that a compact one gives the same leaves at load.
+struct LeafOptions {
+    float max_turning_rad = 0.12f; // of the control polygon of a leaf, each direction
+    float max_aspect = 4.0f;       // longer side over shorter, on the surface
+    uint max_leaves_per_patch = 1024;
+};
+
 struct PackImage {
     std::vector<PartRecord> parts;
     std::vector<InstanceRecord> instances;
@@ -49,6 +56,7 @@ struct PackImage {
     double bounds_hi_mm[3] = {0, 0, 0};
     double world_origin_mm[3] = {0, 0, 0}; // of the top tree's unit space
     double world_scale_mm = 1;
+    LeafOptions leaf_options;
     bool compact = false; // leaves, nodes, cells, textures are left out and rebuilt at load
     std::vector<std::byte> preview_256_png;
     std::vector<std::byte> preview_512_png;
