@@ -293,6 +293,7 @@ PackImage build_pack(const CadModel& model, const BuildOptions& options, BuildRe
 {
     PackImage image;
     image.compact = options.compact;
+    image.leaf_options = options.leaves;
     image.provenance.source_format = model.source_format;
     image.provenance.source_unit = model.source_unit;
     tbb::task_arena arena(options.threads > 0 ? options.threads : tbb::task_arena::automatic);
