@@ -1,0 +1,29 @@
+// The subcommands of `trimray`, one file each (command_<name>.cpp). A subcommand registers itself with the parser and
+// leaves its exit code in `exit_code` when it ran; what it prints follows the conventions of command_report.h.
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace CLI {
+class App;
+}
+
+namespace trimray {
+
+void register_version(CLI::App& app, int& exit_code);
+
+/// Programs of their own that run as subcommands, as git's do: `trimray pack` runs `trimray-pack` with all arguments.
+struct ExternalCommand {
+    const char* name;
+    const char* program;
+    const char* summary;
+};
+const std::vector<ExternalCommand>& external_commands();
+void register_external(CLI::App& app, const ExternalCommand& command);
+
+/// Replaces this process by the command's program: beside our own binary, then ../libexec/trimray, then PATH.
+/// Returns only when it cannot, with the exit code.
+int run_external(const ExternalCommand& command, const std::vector<std::string>& arguments);
+
+} // namespace trimray
