@@ -29,8 +29,10 @@ using uint = std::uint32_t;
 //   sphere    S(u,v) = (r cos v cos u, r cos v sin u, r sin v)                      r = param[0]
 //   torus     S(u,v) = ((R + r cos v) cos u, (R + r cos v) sin u, r sin v)          R = param[0], r = param[1]
 // axis_y is stored, not derived: in a left-handed axis system axis_y = axis_x x axis_z.
-// The axes are turned so that u = 0 is the middle of the face's domain (torus: v too), so an angle in (-pi, pi]
-// maps to uv_face without unwrapping.
+// The axes are turned so that u = 0 is the middle of the face's domain, so an angle u in (-pi, pi] maps to uv_face
+// without unwrapping. The cone's r is that of the domain's middle, >= 0, and its a may be negative; where r + v sin a
+// < 0 (beyond the apex; likewise R + r cos v < 0 on a torus with R < r) the angle of (x, y) is u + pi. The torus' v in
+// (-pi, pi] is unwrapped by one rule: if (uv_face.v < 0.5 - pi * uv_scale.v) uv_face.v += 2 pi * uv_scale.v.
 TRIMRAY_CONST uint kKindPlane = 0u;
 TRIMRAY_CONST uint kKindCylinder = 1u;
 TRIMRAY_CONST uint kKindCone = 2u;
@@ -73,6 +75,7 @@ struct LeafRecord {
     uint patch;
     uint uv_lo; // u | v << 16, each k / 32768, exact; Bezier: uv_patch, native: uv_face
     uint uv_hi;
+    // box: q = center + R(quat) b, |b_i| <= half_i; R's columns are the box's axes
     uint center_xy;       // int16 x | int16 y << 16; center = k / 16384, patch units
     uint center_z_half_x; // int16 | uint16 << 16; half extent = k / 16384
     uint half_yz;         // uint16 | uint16 << 16
@@ -89,7 +92,7 @@ struct BvhNode {
     uint exponents; // x | y << 8 | z << 16, biased by 127 as in a float; child count << 24
     uint lo[3];     // per axis, 4 children x 8 bits
     uint hi[3];
-    uint child[4];    // node index, or kBvhLeaf | leaf index (instance index in the top tree), or kBvhEmpty
+    uint child[4];    // node index, or kBvhLeaf | leaf index (instance index in the top tree), or kBvhEmpty (lo > hi)
     uint reserved[2]; // zero
 };
 TRIMRAY_CONST uint kBvhLeaf = 0x80000000u;
