@@ -1,0 +1,197 @@
+#!/usr/bin/env python3
+"""Packs and validates every file of a corpus of CAD files, and prints a table.
+
+    tests/corpus.py CORPUS_DIR [-o table.tsv] [--only GLOB] [--build DIR] [--timeout S] [--limit-seconds S]
+
+Each file (`.zst` ones are decompressed first) goes through `trimray-pack` and `trimray validate` in processes of their
+own. A row is appended as soon as its file is done, and files that have a row are skipped, so an interrupted run goes on
+where it stopped. The face counts are compared with `faces_unique` in the corpus' MANIFEST.tsv; a file without faces
+there has to end with one line that says why, the exit code of its class, and no pack.
+Exit code: 0 when every row is `ok`, 1 otherwise.
+"""
+
+import argparse
+import csv
+import fnmatch
+import json
+import os
+import pathlib
+import resource
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+
+COLUMNS = ["file", "verdict", "exit", "faces", "expected", "converted", "dropped", "read", "transfer", "convert",
+           "trims", "bvh", "write", "wall", "peak_mib", "pack_bytes", "zst_bytes", "remark"]
+CAD_ENDINGS = {".step", ".stp", ".igs", ".iges", ".brep"}
+# A file without a shape is invalid input, or one that made the kernel crash.
+REFUSALS = {3, 4, 5}
+SLACK_SECONDS = 20  # the converter's own limit comes first, and gives the clearer message
+
+
+def cad_files(corpus):
+    """Paths relative to the corpus, small files first."""
+    found = []
+    for path in corpus.rglob("*"):
+        name = path.name[:-4] if path.name.endswith(".zst") else path.name
+        if path.is_file() and pathlib.Path(name).suffix.lower() in CAD_ENDINGS:
+            found.append(path)
+    return [p.relative_to(corpus) for p in sorted(found, key=lambda p: (p.stat().st_size, str(p)))]
+
+
+def manifest_faces(corpus):
+    with open(corpus / "MANIFEST.tsv", newline="", encoding="utf-8") as table:
+        return {row["path"]: int(row["faces_unique"]) for row in csv.DictReader(table, delimiter="\t")}
+
+
+def run(command, timeout, memory_bytes=0):
+    """Exit code, stdout, last line of stderr, wall seconds, peak MiB of the process and its children. -1: time is up."""
+    def limit():
+        os.setsid()
+        if memory_bytes:
+            resource.setrlimit(resource.RLIMIT_AS, (memory_bytes, memory_bytes))
+    start = time.monotonic()
+    with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
+        process = subprocess.Popen(command, stdout=out, stderr=err, preexec_fn=limit)
+        code, usage = None, None
+        while code is None:
+            pid, status, usage = os.wait4(process.pid, os.WNOHANG)
+            if pid:
+                code = os.waitstatus_to_exitcode(status)
+            elif time.monotonic() - start > timeout:
+                os.killpg(process.pid, signal.SIGKILL)
+                os.wait4(process.pid, 0)
+                code = -1
+            else:
+                time.sleep(0.01)
+        process.returncode = code
+        wall = time.monotonic() - start
+        out.seek(0)
+        err.seek(0)
+        lines = [line for line in err.read().decode(errors="replace").splitlines() if line.strip()]
+        return (code, out.read().decode(errors="replace"), lines[-1] if lines else "", wall,
+                usage.ru_maxrss / 1024 if usage else 0)
+
+
+def compressed_size(path):
+    if path.suffix == ".zst":
+        return path.stat().st_size
+    with subprocess.Popen(["zstd", "-19", "-q", "-c", str(path)], stdout=subprocess.PIPE) as process:
+        size = len(process.stdout.read())
+    return size
+
+
+def decompressed(path, folder):
+    if path.suffix != ".zst":
+        return path
+    plain = pathlib.Path(folder) / path.name[:-4]
+    subprocess.run(["zstd", "-d", "-q", "-f", str(path), "-o", str(plain)], check=True)
+    return plain
+
+
+def check_file(corpus, name, expected, tools, timeout, pack_dir):
+    row = dict.fromkeys(COLUMNS, "")
+    row["file"] = str(name)
+    row["expected"] = "" if expected is None else expected
+    with tempfile.TemporaryDirectory() as folder:
+        model = decompressed(corpus / name, folder)
+        pack = (pack_dir or pathlib.Path(folder)) / (str(name).replace("/", "__").removesuffix(".zst") + ".tray")
+        pack.unlink(missing_ok=True)
+        row["zst_bytes"] = compressed_size(corpus / name)
+        code, out, message, wall, peak = run(
+            [tools["pack"], str(model), "-o", str(pack), "--json", "--timeout", str(int(timeout))],
+            timeout + SLACK_SECONDS)
+        row.update(exit=code, wall=f"{wall:.2f}", peak_mib=f"{peak:.0f}", remark=message[:200])
+        faults = []
+        if code in (0, 6):
+            try:
+                report = json.loads(out)
+            except json.JSONDecodeError:
+                row["verdict"] = "no report"
+                return row
+            row.update(faces=report["faces"], converted=report["converted"], dropped=len(report["dropped"]),
+                       pack_bytes=report["bytes"])
+            for phase, seconds in report["seconds"].items():
+                if phase in row:
+                    row[phase] = f"{seconds:.2f}"
+            if expected is not None and report["faces"] != expected:
+                faults.append("faces differ")
+            if report["dropped"]:
+                reasons = sorted({str(d["reason"]) for d in report["dropped"]})
+                row["remark"] = "; ".join(reasons)[:300]
+                faults.append("faces dropped")
+            if (code == 6) != bool(report["dropped"]):
+                faults.append("exit code")
+            if pack.stat().st_size != report["bytes"]:
+                faults.append("bytes differ")
+            valid, _, complaint, _, _ = run([tools["trimray"], "validate", str(pack)], timeout)
+            if valid != 0:
+                faults.append("not valid")
+                row["remark"] = complaint[:200]
+        else:
+            if expected:
+                faults.append("not packed")
+            if code not in REFUSALS:
+                faults.append("time is up" if code == -1 else "exit code")
+            if not message:
+                faults.append("no message")
+            if pack.exists():
+                faults.append("left a pack")
+        row["verdict"] = ", ".join(faults) or "ok"
+    return row
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("corpus", type=pathlib.Path)
+    parser.add_argument("-o", "--output", type=pathlib.Path, default=pathlib.Path("corpus.tsv"))
+    parser.add_argument("--only", action="append", default=[], metavar="GLOB", help="e.g. 'small/*'; may be repeated")
+    parser.add_argument("--skip", action="append", default=[], metavar="GLOB")
+    parser.add_argument("--build", type=pathlib.Path, default=pathlib.Path(__file__).resolve().parent.parent / "build")
+    parser.add_argument("--timeout", type=float, default=600, help="seconds a file")
+    parser.add_argument("--limit-seconds", type=float, default=float("inf"), help="start no further file after this")
+    parser.add_argument("--keep", type=pathlib.Path, metavar="DIR", help="keep the packs there")
+    options = parser.parse_args()
+
+    tools = {"pack": options.build / "preprocess" / "trimray-pack", "trimray": options.build / "runtime" / "trimray"}
+    for tool in tools.values():
+        if not tool.exists():
+            sys.exit(f"{tool}: not built")
+    if options.keep:
+        options.keep.mkdir(parents=True, exist_ok=True)
+    expected = manifest_faces(options.corpus)
+    done = {}
+    if options.output.exists():
+        with open(options.output, newline="", encoding="utf-8") as table:
+            done = {row["file"]: row for row in csv.DictReader(table, delimiter="\t")}
+    names = [n for n in cad_files(options.corpus)
+             if (not options.only or any(fnmatch.fnmatch(str(n), g) for g in options.only))
+             and not any(fnmatch.fnmatch(str(n), g) for g in options.skip)]
+
+    start = time.monotonic()
+    rows = []
+    with open(options.output, "a", newline="", encoding="utf-8") as table:
+        writer = csv.DictWriter(table, COLUMNS, delimiter="\t", lineterminator="\n")
+        if not done and table.tell() == 0:
+            writer.writeheader()
+        for name in names:
+            if str(name) in done:
+                rows.append(done[str(name)])
+                continue
+            if time.monotonic() - start > options.limit_seconds:
+                print(f"{len(names) - len(rows)} files left for another run", file=sys.stderr)
+                break
+            row = check_file(options.corpus, name, expected.get(str(name)), tools, options.timeout, options.keep)
+            writer.writerow(row)
+            table.flush()
+            rows.append(row)
+            print("\t".join(str(row[c]) for c in COLUMNS), flush=True)
+    bad = [row for row in rows if row["verdict"] != "ok"]
+    print(f"{len(rows)} files, {len(rows) - len(bad)} ok, {len(bad)} not", file=sys.stderr)
+    return 1 if bad else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

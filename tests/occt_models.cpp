@@ -1,0 +1,144 @@
+#include "tests/occt_models.h"
+
+#include <BRepAlgoAPI_Cut.hxx>
+#include <BRepBndLib.hxx>
+#include <BRepBuilderAPI_MakeFace.hxx>
+#include <BRepBuilderAPI_Transform.hxx>
+#include <BRepPrimAPI_MakeCylinder.hxx>
+#include <BRepTools.hxx>
+#include <BRep_Builder.hxx>
+#include <Bnd_Box.hxx>
+#include <GeomAPI_PointsToBSpline.hxx>
+#include <GeomAPI_PointsToBSplineSurface.hxx>
+#include <Geom_BSplineCurve.hxx>
+#include <Geom_BSplineSurface.hxx>
+#include <Geom_OffsetSurface.hxx>
+#include <Geom_RectangularTrimmedSurface.hxx>
+#include <Geom_SurfaceOfLinearExtrusion.hxx>
+#include <Geom_SurfaceOfRevolution.hxx>
+#include <STEPControl_Reader.hxx>
+#include <Standard_Failure.hxx>
+#include <TColgp_Array1OfPnt.hxx>
+#include <TColgp_Array2OfPnt.hxx>
+#include <TopLoc_Location.hxx>
+#include <TopoDS_Compound.hxx>
+#include <gp_Ax1.hxx>
+#include <gp_Ax2.hxx>
+#include <gp_Trsf.hxx>
+
+#include <cmath>
+
+namespace trimray::oracle {
+
+namespace {
+
+constexpr double kFaceTolerance = 1e-7;
+
+Handle(Geom_BSplineCurve) wavy_curve(double z_step)
+{
+    TColgp_Array1OfPnt points(1, 7);
+    for (int i = 1; i <= 7; ++i)
+        points(i) = gp_Pnt(10 + 3 * std::sin(1.3 * i), z_step > 0 ? 0 : 4.0 * i, z_step * i);
+    return GeomAPI_PointsToBSpline(points, 3, 5).Curve();
+}
+
+TopoDS_Shape with_hole(const Handle(Geom_Surface) & surface, const gp_Ax2& drill, double radius)
+{
+    const TopoDS_Shape face = BRepBuilderAPI_MakeFace(surface, kFaceTolerance).Shape();
+    const TopoDS_Shape tool = BRepPrimAPI_MakeCylinder(drill, radius, 100).Shape();
+    return BRepAlgoAPI_Cut(face, tool).Shape();
+}
+
+bool write_shape(const TopoDS_Shape& shape, const std::string& path)
+{
+    return !shape.IsNull() && BRepTools::Write(shape, path.c_str());
+}
+
+TopoDS_Shape read_step(const std::string& path)
+{
+    STEPControl_Reader reader;
+    if (reader.ReadFile(path.c_str()) != IFSelect_RetDone)
+        return {};
+    reader.TransferRoots();
+    return reader.OneShape();
+}
+
+gp_Trsf mirrored_in_x()
+{
+    gp_Trsf mirror;
+    mirror.SetMirror(gp_Ax2(gp_Pnt(0, 0, 0), gp_Dir(1, 0, 0)));
+    return mirror;
+}
+
+} // namespace
+
+bool write_swept_model(const std::string& path)
+{
+    try {
+        BRep_Builder builder;
+        TopoDS_Compound all;
+        builder.MakeCompound(all);
+
+        const Handle(Geom_Surface) extruded = new Geom_RectangularTrimmedSurface(
+            new Geom_SurfaceOfLinearExtrusion(wavy_curve(0), gp_Dir(0, 0, 1)), 0, 20, false);
+        builder.Add(all, with_hole(extruded, gp_Ax2(gp_Pnt(-50, 16, 10), gp_Dir(1, 0, 0)), 4));
+
+        const Handle(Geom_Surface) revolved =
+            new Geom_SurfaceOfRevolution(wavy_curve(4), gp_Ax1(gp_Pnt(0, 0, 0), gp_Dir(0, 0, 1)));
+        const TopoDS_Shape vase = with_hole(revolved, gp_Ax2(gp_Pnt(0, 0, 16), gp_Dir(0.3, -1, 0.1)), 3);
+        gp_Trsf aside;
+        aside.SetTranslation(gp_Vec(40, 0, 0));
+        builder.Add(all, BRepBuilderAPI_Transform(vase, aside, true).Shape());
+
+        TColgp_Array2OfPnt points(1, 6, 1, 6);
+        for (int i = 1; i <= 6; ++i)
+            for (int j = 1; j <= 6; ++j)
+                points(i, j) = gp_Pnt(5.0 * i, 40 + 5.0 * j, 3 * std::sin(0.9 * i) * std::cos(0.7 * j));
+        const Handle(Geom_BSplineSurface) sheet = GeomAPI_PointsToBSplineSurface(points, 3, 5).Surface();
+        const Handle(Geom_Surface) offset = new Geom_OffsetSurface(sheet, 2);
+        builder.Add(all, with_hole(offset, gp_Ax2(gp_Pnt(17, 57, -50), gp_Dir(0, 0, 1)), 4));
+        builder.Add(all, BRepBuilderAPI_MakeFace(Handle(Geom_Surface)(sheet), kFaceTolerance).Shape());
+        return write_shape(all, path);
+    } catch (const Standard_Failure&) {
+        return false;
+    }
+}
+
+bool write_left_handed_copy(const std::string& from, const std::string& path)
+{
+    try {
+        return write_shape(BRepBuilderAPI_Transform(read_step(from), mirrored_in_x(), true).Shape(), path);
+    } catch (const Standard_Failure&) {
+        return false;
+    }
+}
+
+bool write_placed_copies(const std::string& from, const std::string& path)
+{
+    try {
+        const TopoDS_Shape shape = read_step(from);
+        Bnd_Box box;
+        BRepBndLib::Add(shape, box, false);
+        double lo[3], hi[3];
+        box.Get(lo[0], lo[1], lo[2], hi[0], hi[1], hi[2]);
+        const double size = std::hypot(hi[0] - lo[0], hi[1] - lo[1], hi[2] - lo[2]);
+
+        gp_Trsf turned, moved, mirrored_away;
+        turned.SetRotation(gp_Ax1(gp_Pnt(0, 0, 0), gp_Dir(1, 2, 3)), 0.7);
+        moved.SetTranslation(gp_Vec(size, 0.2 * size, 0));
+        mirrored_away.SetTranslation(gp_Vec(-0.3 * size, size, 0.1 * size));
+        BRep_Builder builder;
+        TopoDS_Compound all;
+        builder.MakeCompound(all);
+        builder.Add(all, shape);
+        builder.Add(all, shape.Moved(TopLoc_Location(moved * turned)));
+        TopoDS_Shape image = shape;
+        image.Location(TopLoc_Location(mirrored_away * mirrored_in_x()), false); // false: mirror images are meant
+        builder.Add(all, image);
+        return write_shape(all, path);
+    } catch (const Standard_Failure&) {
+        return false;
+    }
+}
+
+} // namespace trimray::oracle
