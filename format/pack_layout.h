@@ -19,6 +19,7 @@ using uint = std::uint32_t;
 #define TRIMRAY_CONST inline constexpr
 #else
 #define TRIMRAY_CONST const
+#define patch patch_index // `patch` is a keyword of GLSL: there LeafRecord.patch is a field of this name
 #endif
 
 // ---- surface kinds -------------------------------------------------------------------------------------------------
