@@ -1,0 +1,65 @@
+// Newton's iteration for a ray against a patch: the ray is the line where two planes meet (Kajiya 1982), and a root of
+// R(u, v) = (n1 . S + d1, n2 . S + d2) is a point of the patch on that line.
+#if defined(TRIMRAY_SHARED_PATCH_NEWTON_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef TRIMRAY_SHARED_PATCH_NEWTON_H
+#undef TRIMRAY_SHARED_PATCH_NEWTON_H
+#else
+#define TRIMRAY_SHARED_PATCH_NEWTON_H
+#endif
+
+#include "shaders/shared/bezier.h"
+#include "shaders/shared/language.h"
+
+SHARED_OPEN
+
+struct RayPlanes {
+    real3 n1; // unit, orthogonal
+    real d1;
+    real3 n2;
+    real d2;
+};
+
+FN RayPlanes ray_planes(real3 origin, real3 direction)
+{
+    // a direction across: from the two components that cannot both be small
+    mask x_large = abs(direction.x) > abs(direction.z);
+    PRECISE real3 across =
+        select(x_large, real3(-direction.y, direction.x, real(0.0f)), real3(real(0.0f), -direction.z, direction.y));
+    RayPlanes planes;
+    planes.n1 = across * (1.0f / length(across));
+    PRECISE real3 other = cross(direction, planes.n1);
+    planes.n2 = other * (1.0f / length(other));
+    planes.d1 = -dot(planes.n1, origin);
+    planes.d2 = -dot(planes.n2, origin);
+    return planes;
+}
+
+struct NewtonStep {
+    real2 uv;      // after the step; may leave [0,1]^2, the caller decides
+    real residual; // before the step: distance of the point from the ray, patch units
+    mask singular; // the step was not taken
+};
+
+// One step. Source: Kajiya 1982; Cramer's rule.
+FN NewtonStep newton_step(SurfacePoint s, RayPlanes ray, real2 uv)
+{
+    PRECISE real r1 = dot(ray.n1, s.p) + ray.d1;
+    PRECISE real r2 = dot(ray.n2, s.p) + ray.d2;
+    PRECISE real a1 = dot(ray.n1, s.du); // columns of the Jacobian
+    PRECISE real a2 = dot(ray.n2, s.du);
+    PRECISE real b1 = dot(ray.n1, s.dv);
+    PRECISE real b2 = dot(ray.n2, s.dv);
+    PRECISE real det = a1 * b2 - b1 * a2;
+    // rounding alone gives |det| a few eps of |R_u| |R_v|: below that its sign means nothing
+    PRECISE real noise = 8.0f * kRounding * sqrt((a1 * a1 + a2 * a2) * (b1 * b1 + b2 * b2));
+    NewtonStep next;
+    next.singular = abs(det) <= noise;
+    PRECISE real per_det = 1.0f / select(next.singular, real(1.0f), det);
+    next.residual = sqrt(r1 * r1 + r2 * r2);
+    real2 moved = real2(uv.x - (b2 * r1 - b1 * r2) * per_det, uv.y - (a1 * r2 - a2 * r1) * per_det);
+    next.uv = select(next.singular, uv, moved);
+    return next;
+}
+
+SHARED_CLOSE
+#endif
