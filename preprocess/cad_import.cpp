@@ -1,10 +1,163 @@
 #include "preprocess/cad_import.h"
 
-namespace trimray {
+#include "preprocess/cad_import_kernel.h"
 
-Result<CadModel> import_cad(const std::string& path, const ImportOptions&, const Progress&)
+#include <BRepBndLib.hxx>
+#include <BRepBuilderAPI_Transform.hxx>
+#include <BRepMesh_IncrementalMesh.hxx>
+#include <BRepTools.hxx>
+#include <BRep_Tool.hxx>
+#include <Bnd_Box.hxx>
+#include <Message.hxx>
+#include <Message_Messenger.hxx>
+#include <OSD.hxx>
+#include <Poly_Triangulation.hxx>
+#include <Standard_ErrorHandler.hxx>
+#include <Standard_Failure.hxx>
+#include <TopExp.hxx>
+#include <TopExp_Explorer.hxx>
+#include <TopLoc_Location.hxx>
+#include <TopoDS.hxx>
+#include <TopoDS_Edge.hxx>
+
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <csignal>
+#include <fmt/format.h>
+
+namespace trimray {
+namespace kernel {
+namespace {
+
+/// Silences the kernel's messages while it lives.
+class QuietKernel {
+public:
+    QuietKernel() : saved_(Message::DefaultMessenger()->Printers())
+    {
+        Message::DefaultMessenger()->ChangePrinters().Clear();
+    }
+    ~QuietKernel() { Message::DefaultMessenger()->ChangePrinters() = saved_; }
+    QuietKernel(const QuietKernel&) = delete;
+    QuietKernel& operator=(const QuietKernel&) = delete;
+
+private:
+    Message_SequenceOfPrinters saved_;
+};
+
+/// Lets the kernel turn its faults (bad access, bad arithmetic) into exceptions while it lives; everything else keeps
+/// the handlers it had.
+class FaultsAsExceptions {
+public:
+    FaultsAsExceptions()
+    {
+        for (size_t i = 0; i < kAll.size(); ++i)
+            sigaction(kAll[i], nullptr, &saved_[i]);
+        OSD::SetSignal(false);
+        for (size_t i = kFaults; i < kAll.size(); ++i)
+            sigaction(kAll[i], &saved_[i], nullptr);
+    }
+    ~FaultsAsExceptions()
+    {
+        for (size_t i = 0; i < kAll.size(); ++i)
+            sigaction(kAll[i], &saved_[i], nullptr);
+    }
+    FaultsAsExceptions(const FaultsAsExceptions&) = delete;
+    FaultsAsExceptions& operator=(const FaultsAsExceptions&) = delete;
+
+private:
+    static constexpr size_t kFaults = 4;
+    static constexpr std::array kAll{SIGSEGV, SIGBUS,  SIGFPE,  SIGILL, SIGHUP,
+                                     SIGINT,  SIGQUIT, SIGTERM, SIGSYS, SIGPIPE};
+    std::array<struct sigaction, kAll.size()> saved_{};
+};
+
+std::string trimmed_message(const char* text)
 {
-    return Error{ErrorCode::UnsupportedFormat, path, "no reader yet"};
+    std::string message = text ? text : "";
+    if (message.size() > 200)
+        message.resize(200);
+    return message;
+}
+
+} // namespace
+
+std::optional<std::string> failure_of(const std::function<void()>& action)
+{
+    try {
+        OCC_CATCH_SIGNALS
+        action();
+        return std::nullopt;
+    } catch (const Standard_Failure& failure) {
+        return fmt::format("the kernel gave up: {} {}", failure.DynamicType()->Name(),
+                           trimmed_message(failure.GetMessageString()));
+    } catch (const std::exception& failure) {
+        return fmt::format("the kernel gave up: {}", trimmed_message(failure.what()));
+    } catch (...) {
+        return "the kernel gave up without a reason";
+    }
+}
+
+double diagonal_mm(const TopoDS_Shape& shape)
+{
+    Bnd_Box box;
+    BRepBndLib::AddClose(shape, box); // of vertices and poles: cheap, and large enough
+    if (box.IsVoid())
+        BRepBndLib::Add(shape, box, false);
+    if (box.IsVoid() || box.IsOpen())
+        return 0;
+    return std::sqrt(box.SquareExtent());
+}
+
+} // namespace kernel
+
+Result<CadModel> import_cad(const std::string& path, const ImportOptions& options, const Progress& progress)
+{
+    const Result<kernel::CadFormat> format = kernel::detect_format(path);
+    if (!format)
+        return format.error();
+    const kernel::QuietKernel quiet;
+    const kernel::FaultsAsExceptions faults;
+
+    std::optional<Result<kernel::LoadedFile>> loaded;
+    if (const auto failure = kernel::failure_of([&] { loaded = kernel::load_file(path, *format, options, progress); }))
+        return Error{ErrorCode::InvalidCad, path, *failure + "; the file is damaged, export it again"};
+    if (!*loaded)
+        return loaded->error();
+    kernel::LoadedFile& file = **loaded;
+
+    CadModel model;
+    model.source_format = file.source_format;
+    model.source_unit = file.source_unit;
+    model.read_seconds = file.read_seconds;
+    model.transfer_seconds = file.transfer_seconds;
+    model.warnings = std::move(file.warnings);
+    if (file.parts.empty()) {
+        std::string detail = fmt::format("{} holds no faces: wires, points, annotations or other data only; export "
+                                         "solids or surfaces",
+                                         file.source_format);
+        for (const std::string& warning : model.warnings)
+            detail += "; " + warning;
+        return Error{ErrorCode::EmptyCad, path, detail};
+    }
+    model.instances = std::move(file.instances);
+    model.tree = std::move(file.tree);
+    for (size_t i = 0; i < file.parts.size(); ++i) {
+        const auto part = static_cast<uint32_t>(i);
+        model.parts.push_back(kernel::convert_part(file.parts[i], part, options, model.dropped, progress));
+        if (progress)
+            progress("faces", static_cast<double>(i + 1) / static_cast<double>(file.parts.size()));
+    }
+    if (options.proxy_deflection > 0) {
+        const auto start = std::chrono::steady_clock::now();
+        for (size_t i = 0; i < file.parts.size(); ++i) {
+            kernel::mesh_part(file.parts[i].shape, options.proxy_deflection, model.parts[i], model.warnings);
+            if (progress)
+                progress("mesh", static_cast<double>(i + 1) / static_cast<double>(file.parts.size()));
+        }
+        model.mesh_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    }
+    return model;
 }
 
 } // namespace trimray

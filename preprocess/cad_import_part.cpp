@@ -1,0 +1,191 @@
+// Parts: faces and edges of a shape, each face converted or dropped with a reason, and the triangles of the proxy mesh.
+#include "preprocess/cad_import_kernel.h"
+
+#include <BRepBuilderAPI_Transform.hxx>
+#include <BRepMesh_IncrementalMesh.hxx>
+#include <BRepTools.hxx>
+#include <BRep_Tool.hxx>
+#include <Poly_Triangulation.hxx>
+#include <TopExp.hxx>
+#include <TopExp_Explorer.hxx>
+#include <TopLoc_Location.hxx>
+#include <TopoDS.hxx>
+#include <TopoDS_Edge.hxx>
+#include <TopoDS_Face.hxx>
+
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+
+namespace trimray::kernel {
+namespace {
+
+constexpr double kAngularDeflection = 0.6; // of the proxy mesh, radians: ten segments a circle
+
+Rect2d uv_bounds(const TopoDS_Face& face)
+{
+    Rect2d bounds;
+    BRepTools::UVBounds(face, bounds.lo.x, bounds.hi.x, bounds.lo.y, bounds.hi.y);
+    return bounds;
+}
+
+Result<CadFace> convert_face(const TopoDS_Face& face, const TopTools_IndexedMapOfShape& edges,
+                             const ImportOptions& options, double tolerance_mm)
+{
+    const TopoDS_Face forward = TopoDS::Face(face.Oriented(TopAbs_FORWARD));
+    CadFace out;
+    out.reversed = face.Orientation() == TopAbs_REVERSED;
+    out.tolerance_mm = BRep_Tool::Tolerance(face);
+    Result<std::vector<CadLoop>> loops = collect_loops(forward, edges);
+    if (!loops)
+        return loops.error();
+    const Rect2d bounds = uv_bounds(forward);
+    Result<ConvertedSurface> surface = convert_surface(forward, bounds, options, tolerance_mm);
+    if (!surface)
+        return surface.error();
+    out.surface = std::move(surface->surface);
+    out.loops = std::move(*loops);
+    if (!surface->uv_map.identity())
+        for (CadLoop& loop : out.loops)
+            for (CadEdgeUse& use : loop) {
+                Result<ConvertedPcurve> mapped =
+                    map_pcurve({std::move(use.pcurve), use.first, use.last}, surface->uv_map, bounds);
+                if (!mapped)
+                    return mapped.error();
+                use.pcurve = std::move(mapped->curve);
+                use.first = mapped->first;
+                use.last = mapped->last;
+            }
+    const Rect2d& natural = out.surface.natural_bounds;
+    const bool endless = natural.hi.x - natural.lo.x > 1e99 || natural.hi.y - natural.lo.y > 1e99;
+    if (out.loops.empty() && endless)
+        return Error{ErrorCode::InvalidSurface, "surface", "it is infinite and has no loops to bound it"};
+    for (const CadLoop& loop : out.loops)
+        for (const CadEdgeUse& use : loop)
+            out.tolerance_mm = std::max(out.tolerance_mm, BRep_Tool::Tolerance(TopoDS::Edge(edges(use.edge + 1))));
+    return out;
+}
+
+/// Colours of faces: the face's own, else that of the smallest sub-shape that holds it, else the part's.
+ShapeMap<uint32_t> face_colors(const PartShape& source)
+{
+    ShapeMap<uint32_t> colors;
+    for (const TopAbs_ShapeEnum kind : {TopAbs_COMPOUND, TopAbs_COMPSOLID, TopAbs_SOLID, TopAbs_SHELL, TopAbs_FACE}) {
+        TopTools_IndexedMapOfShape holders;
+        TopExp::MapShapes(source.shape, kind, holders);
+        for (int i = 1; i <= holders.Extent(); ++i)
+            if (source.colors.IsBound(holders(i)))
+                for (TopExp_Explorer face(holders(i), TopAbs_FACE); face.More(); face.Next())
+                    colors.Bind(face.Current(), source.colors.Find(holders(i)));
+    }
+    return colors;
+}
+
+/// A shape whose inner locations scale gets them worked into its geometry, since they change surfaces' parameters.
+TopoDS_Shape without_scaled_locations(const TopoDS_Shape& shape)
+{
+    bool scaled = false;
+    for (TopExp_Explorer face(shape, TopAbs_FACE); face.More() && !scaled; face.Next()) {
+        TopLoc_Location location;
+        BRep_Tool::Surface(TopoDS::Face(face.Current()), location);
+        scaled = std::abs(std::abs(location.Transformation().ScaleFactor()) - 1) > 1e-12;
+    }
+    if (!scaled)
+        return shape;
+    BRepBuilderAPI_Transform transform(shape, gp_Trsf(), true);
+    return transform.Shape();
+}
+
+} // namespace
+
+CadPart convert_part(const PartShape& source, uint32_t part_index, const ImportOptions& options,
+                     std::vector<CadDroppedFace>& dropped, const Progress&)
+{
+    CadPart part;
+    part.name = source.name;
+    const TopoDS_Shape shape = without_scaled_locations(source.shape);
+    TopTools_IndexedMapOfShape faces, edges;
+    TopExp::MapShapes(shape, TopAbs_FACE, faces);
+    TopExp::MapShapes(shape, TopAbs_EDGE, edges);
+    const ShapeMap<uint32_t> colors = face_colors(source);
+    double tolerance_mm = options.approximation_tolerance_mm;
+    if (!(tolerance_mm > 0))
+        tolerance_mm = std::max(1e-6 * diagonal_mm(shape), 1e-9);
+
+    for (int i = 1; i <= edges.Extent(); ++i) {
+        const TopoDS_Edge edge = TopoDS::Edge(edges(i));
+        CadEdge out;
+        out.tolerance_mm = BRep_Tool::Tolerance(edge);
+        out.smooth = BRep_Tool::MaxContinuity(edge) >= GeomAbs_G1;
+        part.edges.push_back(out);
+    }
+    for (int i = 1; i <= faces.Extent(); ++i) {
+        const TopoDS_Face face = TopoDS::Face(faces(i));
+        const auto face_in_part = static_cast<uint32_t>(i - 1);
+        const std::string name = source.names.IsBound(face) ? source.names.Find(face) : std::string();
+        std::optional<Result<CadFace>> converted;
+        const auto failure = failure_of([&] { converted = convert_face(face, edges, options, tolerance_mm); });
+        if (failure) {
+            dropped.push_back({part_index, face_in_part, name, *failure});
+            continue;
+        }
+        if (!*converted) {
+            const Error& error = converted->error();
+            dropped.push_back({part_index, face_in_part, name, fmt::format("{}: {}", error.where, error.detail)});
+            continue;
+        }
+        CadFace& out = **converted;
+        out.face_in_part = face_in_part;
+        out.name = name;
+        out.color_rgba = colors.IsBound(face) ? std::optional(colors.Find(face)) : source.color_rgba;
+        part.faces.push_back(std::move(out));
+    }
+    return part;
+}
+
+void mesh_part(const TopoDS_Shape& shape, double deflection, CadPart& part, std::vector<std::string>& warnings)
+{
+    const double diagonal = diagonal_mm(shape);
+    if (!(diagonal > 0))
+        return;
+    IMeshTools_Parameters parameters;
+    parameters.Deflection = deflection * diagonal;
+    parameters.Angle = kAngularDeflection;
+    parameters.InParallel = true;
+    const auto failure = failure_of([&] { BRepMesh_IncrementalMesh mesh(shape, parameters); });
+    if (failure) {
+        warnings.push_back(fmt::format("part \"{}\": no proxy mesh: {}", part.name, *failure));
+        return;
+    }
+    TopTools_IndexedMapOfShape faces;
+    TopExp::MapShapes(shape, TopAbs_FACE, faces);
+    CadMesh& mesh = part.mesh;
+    for (size_t k = 0; k < part.faces.size(); ++k) {
+        const TopoDS_Face face = TopoDS::Face(faces(static_cast<int>(part.faces[k].face_in_part) + 1));
+        TopLoc_Location location;
+        const Handle(Poly_Triangulation) triangulation = BRep_Tool::Triangulation(face, location);
+        if (triangulation.IsNull())
+            continue;
+        const gp_Trsf transform = location.Transformation();
+        const auto first = static_cast<uint32_t>(mesh.positions.size() / 3);
+        for (int i = 1; i <= triangulation->NbNodes(); ++i) {
+            const gp_Pnt p = triangulation->Node(i).Transformed(transform);
+            for (const double x : {p.X(), p.Y(), p.Z()})
+                mesh.positions.push_back(static_cast<float>(x));
+        }
+        const bool flip = (face.Orientation() == TopAbs_REVERSED) != transform.IsNegative();
+        for (int i = 1; i <= triangulation->NbTriangles(); ++i) {
+            int a = 0, b = 0, c = 0;
+            triangulation->Triangle(i).Get(a, b, c);
+            if (flip)
+                std::swap(b, c);
+            for (const int node : {a, b, c})
+                mesh.triangles.push_back(first + static_cast<uint32_t>(node - 1));
+            mesh.triangle_face.push_back(static_cast<uint32_t>(k));
+        }
+    }
+    if (mesh.triangles.empty())
+        warnings.push_back(fmt::format("part \"{}\": no proxy mesh: the kernel made no triangles", part.name));
+}
+
+} // namespace trimray::kernel

@@ -1,0 +1,123 @@
+#include "runtime/effect_plan.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+namespace trimray {
+namespace {
+
+std::string counted(size_t count, const char* one, const char* many)
+{
+    return fmt::format("{} {}", count, count == 1 ? one : many);
+}
+
+template <class Range, class Predicate>
+size_t count_if(const Range& range, Predicate predicate)
+{
+    return static_cast<size_t>(std::count_if(range.begin(), range.end(), predicate));
+}
+
+// What the tracer meets are patches; a file's cylinder may have been converted to Bezier patches.
+void add_surfaces(const PackImage& image, std::vector<EffectItem>& plan)
+{
+    std::array<size_t, kSurfaceKindCount> native{};
+    size_t rational = 0, polynomial = 0;
+    uint max_degree = 0;
+    for (const PatchRecord& patch : image.patches) {
+        const uint kind = patch.shape & 0xffu;
+        if (kind != kKindBezier) {
+            ++native[kind];
+            continue;
+        }
+        ++((patch.shape & kShapeRational) != 0 ? rational : polynomial);
+        max_degree = std::max({max_degree, (patch.shape >> 8) & 0xffu, (patch.shape >> 16) & 0xffu});
+    }
+    for (uint kind = 0; kind < kKindBezier; ++kind)
+        if (native[kind] > 0)
+            plan.push_back({surface_kind_name(kind),
+                            counted(native[kind], "native patch, closed form", "native patches, closed form")});
+    if (polynomial > 0)
+        plan.push_back(
+            {"bezier", fmt::format("{}, degree up to {}", counted(polynomial, "polynomial patch", "polynomial patches"),
+                                   max_degree)});
+    if (rational > 0)
+        plan.push_back(
+            {"bezier-rational",
+             fmt::format("{}, degree up to {}", counted(rational, "rational patch", "rational patches"), max_degree)});
+}
+
+void add_trims(const PackImage& image, const RenderOptions& options, std::vector<EffectItem>& plan)
+{
+    const size_t trimmed =
+        count_if(image.faces, [](const FaceRecord& face) { return (face.flags & kFaceNaturalBorder) == 0; });
+    if (trimmed == 0)
+        return;
+    const std::string why = fmt::format("{} of {} have trims that are not their natural border", trimmed,
+                                        counted(image.faces.size(), "face", "faces"));
+    plan.push_back({options.trim == TrimMode::Sdf ? "trim-sdf" : "trim-exact", why});
+}
+
+void add_placements(const PackImage& image, std::vector<EffectItem>& plan)
+{
+    const size_t mirrored = count_if(image.instances, [](const InstanceRecord& instance) {
+        const double* t = instance.transform; // row-major 3x4
+        const double determinant = t[0] * (t[5] * t[10] - t[6] * t[9]) - t[1] * (t[4] * t[10] - t[6] * t[8]) +
+                                   t[2] * (t[4] * t[9] - t[5] * t[8]);
+        return determinant < 0;
+    });
+    if (image.instances.size() > 1)
+        plan.push_back({"instances", fmt::format("{} of {}", counted(image.instances.size(), "placement", "placements"),
+                                                 counted(image.parts.size(), "part", "parts"))});
+    if (mirrored > 0)
+        plan.push_back(
+            {"mirrored-instances", counted(mirrored, "placement is a mirror image", "placements are mirror images")});
+}
+
+void add_colors(const PackImage& image, std::vector<EffectItem>& plan)
+{
+    const size_t faces =
+        count_if(image.faces, [](const FaceRecord& face) { return (face.flags & kFaceHasColor) != 0; });
+    const size_t placements =
+        count_if(image.instances, [](const InstanceRecord& instance) { return (instance.color_rgba >> 24) != 0; });
+    if (faces > 0)
+        plan.push_back({"face-colors", counted(faces, "face has its own colour", "faces have their own colours")});
+    if (placements > 0)
+        plan.push_back({"instance-colors", counted(placements, "placement has a colour", "placements have colours")});
+}
+
+} // namespace
+
+std::array<uint32_t, kSurfaceKindCount> faces_by_kind(const PackImage& image)
+{
+    std::array<uint32_t, kSurfaceKindCount> counts{};
+    for (const FaceRecord& face : image.faces)
+        ++counts[face.surface_kind];
+    return counts;
+}
+
+const char* surface_kind_name(uint kind)
+{
+    constexpr std::array<const char*, kSurfaceKindCount> names = {"plane",  "cylinder", "cone",
+                                                                  "sphere", "torus",    "bezier"};
+    return kind < names.size() ? names[kind] : "unknown";
+}
+
+std::vector<EffectItem> effect_plan(const PackImage& image, const RenderOptions& options)
+{
+    std::vector<EffectItem> plan;
+    add_surfaces(image, plan);
+    add_trims(image, options, plan);
+    add_placements(image, plan);
+    add_colors(image, plan);
+    const size_t flagged =
+        count_if(image.leaves, [](const LeafRecord& leaf) { return ((leaf.quat_z_flags >> 16) & kLeafFlagged) != 0; });
+    if (flagged > 0)
+        plan.push_back({"many-starts", fmt::format("{} not certified to hold one hit a ray, of {}",
+                                                   counted(flagged, "leaf is", "leaves are"), image.leaves.size())});
+    if (options.shade)
+        plan.push_back({"shading", "the picture is asked for, not hits alone"});
+    return plan;
+}
+
+} // namespace trimray
