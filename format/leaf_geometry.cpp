@@ -1,0 +1,178 @@
+#include "format/leaf_geometry.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+
+namespace trimray {
+namespace {
+
+constexpr double kQuatUnit = 32767;
+constexpr double kPi = 3.14159265358979323846;
+
+double signed_low(uint bits)
+{
+    return static_cast<std::int16_t>(bits & 0xffffu);
+}
+double signed_high(uint bits)
+{
+    return static_cast<std::int16_t>(bits >> 16);
+}
+
+/// x to the nearest integer in [lo, hi]; not a number counts as lo, so that no input is undefined.
+int to_int(double x, int lo, int hi)
+{
+    return x >= hi ? hi : x > lo ? static_cast<int>(std::lround(x)) : lo;
+}
+uint low_bits(int x)
+{
+    return static_cast<uint>(x) & 0xffffu;
+}
+
+std::array<Point3, 3> axes_of(double x, double y, double z)
+{
+    const double w = std::sqrt(std::max(1 - x * x - y * y - z * z, 0.0));
+    return {Point3{1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)},
+            Point3{2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x)},
+            Point3{2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)}};
+}
+
+/// The rotation nearest to the identity among those that turn the unit axes into +-axes in any order.
+std::array<Point3, 3> nearest_to_identity(const std::array<Point3, 3>& axes)
+{
+    constexpr int kOrders[6][3] = {{0, 1, 2}, {0, 2, 1}, {1, 0, 2}, {1, 2, 0}, {2, 0, 1}, {2, 1, 0}};
+    std::array<Point3, 3> best = axes;
+    double best_trace = -4;
+    for (const auto& order : kOrders) {
+        std::array<Point3, 3> turned;
+        double trace = 0;
+        int weakest = 0;
+        for (int i = 0; i < 3; ++i) {
+            turned[i] = axes[order[i]];
+            if (turned[i][i] < 0)
+                for (double& c : turned[i])
+                    c = -c;
+            trace += turned[i][i];
+            if (turned[i][i] < turned[weakest][weakest])
+                weakest = i;
+        }
+        if (dot3(cross3(turned[0], turned[1]), turned[2]) < 0) {
+            trace -= 2 * turned[weakest][weakest];
+            for (double& c : turned[weakest])
+                c = -c;
+        }
+        if (trace > best_trace) {
+            best_trace = trace;
+            best = turned;
+        }
+    }
+    return best;
+}
+
+/// max of a cos t + b sin t over [lo, hi].
+double largest_on_arc(double a, double b, double lo, double hi)
+{
+    const double peak = std::atan2(b, a);
+    const double nearest = peak + 2 * kPi * std::ceil((lo - peak) / (2 * kPi)); // first peak at or after lo
+    if (nearest <= hi)
+        return std::hypot(a, b);
+    return std::max(a * std::cos(lo) + b * std::sin(lo), a * std::cos(hi) + b * std::sin(hi));
+}
+
+} // namespace
+
+OrientedBox decode_leaf_box(const LeafRecord& leaf)
+{
+    OrientedBox box;
+    box.center = {signed_low(leaf.center_xy) * kLeafQuantum, signed_high(leaf.center_xy) * kLeafQuantum,
+                  signed_low(leaf.center_z_half_x) * kLeafQuantum};
+    box.half = {(leaf.center_z_half_x >> 16) * double(kLeafQuantum), (leaf.half_yz & 0xffffu) * double(kLeafQuantum),
+                (leaf.half_yz >> 16) * double(kLeafQuantum)};
+    box.axis = axes_of(signed_low(leaf.quat_xy) / kQuatUnit, signed_high(leaf.quat_xy) / kQuatUnit,
+                       signed_low(leaf.quat_z_flags) / kQuatUnit);
+    return box;
+}
+
+std::array<Point3, 3> encode_leaf_axes(const std::array<Point3, 3>& axes, LeafRecord& leaf)
+{
+    const std::array<Point3, 3> r = nearest_to_identity(axes);
+    // w = sqrt(1 + trace) / 2,  (x, y, z) = (R_zy - R_yz, R_xz - R_zx, R_yx - R_xy) / 4w; r[i] are columns
+    const double w = 0.5 * std::sqrt(1 + r[0][0] + r[1][1] + r[2][2]);
+    const int x = to_int((r[1][2] - r[2][1]) / (4 * w) * kQuatUnit, -32767, 32767);
+    const int y = to_int((r[2][0] - r[0][2]) / (4 * w) * kQuatUnit, -32767, 32767);
+    const int z = to_int((r[0][1] - r[1][0]) / (4 * w) * kQuatUnit, -32767, 32767);
+    leaf.quat_xy = low_bits(x) | low_bits(y) << 16;
+    leaf.quat_z_flags = (leaf.quat_z_flags & 0xffff0000u) | low_bits(z);
+    return axes_of(x / kQuatUnit, y / kQuatUnit, z / kQuatUnit);
+}
+
+void encode_leaf_extent(const std::array<Point3, 3>& axes, const Point3& lo, const Point3& hi, double margin,
+                        LeafRecord& leaf)
+{
+    constexpr double kPerUnit = 1.0 / kLeafQuantum;
+    int center[3], half[3];
+    Point3 decoded{};
+    for (int c = 0; c < 3; ++c) {
+        double x = 0;
+        for (int i = 0; i < 3; ++i)
+            x += 0.5 * (lo[i] + hi[i]) * axes[i][c];
+        center[c] = to_int(x * kPerUnit, -32768, 32767);
+        decoded[c] = center[c] / kPerUnit;
+    }
+    for (int i = 0; i < 3; ++i) {
+        // from the centre as it decodes to the farther side, rounded up
+        const double at = dot3(decoded, axes[i]);
+        const double reach = std::max(hi[i] - at, at - lo[i]) + margin;
+        half[i] = to_int(std::ceil(reach * kPerUnit), 0, 65535);
+    }
+    leaf.center_xy = low_bits(center[0]) | low_bits(center[1]) << 16;
+    leaf.center_z_half_x = low_bits(center[2]) | low_bits(half[0]) << 16;
+    leaf.half_yz = low_bits(half[1]) | low_bits(half[2]) << 16;
+}
+
+NativePiece native_piece(const PatchRecord& patch, const std::array<double, 2>& lo, const std::array<double, 2>& hi)
+{
+    NativePiece piece;
+    piece.kind = patch.shape & 0xffu;
+    for (int i = 0; i < 2; ++i) {
+        piece.param[i] = patch.param[i];
+        piece.lo[i] = (lo[i] - patch.uv_offset[i]) / patch.uv_scale[i];
+        piece.hi[i] = (hi[i] - patch.uv_offset[i]) / patch.uv_scale[i];
+    }
+    return piece;
+}
+
+double largest_along(const NativePiece& piece, const Point3& d)
+{
+    const double u0 = piece.lo[0], u1 = piece.hi[0], v0 = piece.lo[1], v1 = piece.hi[1];
+    if (piece.kind == kKindPlane)
+        return std::max(d[0] * u0, d[0] * u1) + std::max(d[1] * v0, d[1] * v1);
+    // S . d = rho(v) m(u) + h(v) d_z with m = d_x cos u + d_y sin u; for a given v the largest is at the largest m
+    // where rho >= 0, at the smallest where rho < 0
+    const double r = piece.param[0];
+    double largest = -1e300;
+    for (const double m : {largest_on_arc(d[0], d[1], u0, u1), -largest_on_arc(-d[0], -d[1], u0, u1)}) {
+        double here = 0;
+        switch (piece.kind) {
+        case kKindCylinder:
+            here = r * m + std::max(d[2] * v0, d[2] * v1);
+            break;
+        case kKindCone: {
+            // rho = r + v sin a, h = v cos a: linear in v
+            const double cos_a = 1 / std::sqrt(1 + piece.param[1] * piece.param[1]), sin_a = piece.param[1] * cos_a;
+            here = std::max((r + v0 * sin_a) * m + v0 * cos_a * d[2], (r + v1 * sin_a) * m + v1 * cos_a * d[2]);
+            break;
+        }
+        case kKindSphere:
+            here = r * largest_on_arc(m, d[2], v0, v1);
+            break;
+        default: // torus
+            here = r * m + piece.param[1] * largest_on_arc(m, d[2], v0, v1);
+            break;
+        }
+        largest = std::max(largest, here);
+    }
+    return largest;
+}
+
+} // namespace trimray

@@ -1,0 +1,256 @@
+// CadSurface over a domain -> PatchRecord: frames re-centred on the domain, numbers near 1, single precision.
+#include "preprocess/bezier_patch.h"
+#include "preprocess/vec3d.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <fmt/format.h>
+
+namespace trimray {
+namespace {
+
+Error invalid(const CadSurface& surface, std::string detail)
+{
+    return {ErrorCode::InvalidSurface, surface.source_kind, std::move(detail)};
+}
+
+/// Places the patch's origin (part units, hi + lo) and scale; returns the scale in mm as the record holds it.
+double place(const Vec3d& origin_mm, double scale_mm, const PartFrame& frame, PatchRecord& patch)
+{
+    const Vec3d p = (1 / frame.scale_mm) * (origin_mm - frame.origin_mm);
+    const double xyz[3] = {p.x, p.y, p.z};
+    for (int c = 0; c < 3; ++c) {
+        patch.origin_hi[c] = static_cast<float>(xyz[c]);
+        patch.origin_lo[c] = static_cast<float>(xyz[c] - patch.origin_hi[c]);
+    }
+    patch.scale = static_cast<float>(scale_mm / frame.scale_mm);
+    return double(patch.scale) * frame.scale_mm;
+}
+
+/// Where the record's origin really is, in mm.
+Vec3d placed_origin_mm(const PatchRecord& patch, const PartFrame& frame)
+{
+    double p[3];
+    for (int c = 0; c < 3; ++c)
+        p[c] = double(patch.origin_hi[c]) + double(patch.origin_lo[c]);
+    return frame.origin_mm + frame.scale_mm * Vec3d{p[0], p[1], p[2]};
+}
+
+void store(float (&to)[3], const Vec3d& from)
+{
+    to[0] = static_cast<float>(from.x);
+    to[1] = static_cast<float>(from.y);
+    to[2] = static_cast<float>(from.z);
+}
+
+bool finite(const Vec3d& p)
+{
+    return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z);
+}
+
+/// uv_face = offset + scale * uv_patch, with uv_patch = (uv_file - zero) / unit.
+void map_parameter(PatchRecord& patch, int direction, double lo, double hi, double zero, double unit)
+{
+    patch.uv_scale[direction] = static_cast<float>(unit / (hi - lo));
+    patch.uv_offset[direction] = static_cast<float>((zero - lo) / (hi - lo));
+}
+
+/// The part of a native surface over its domain, in its own frame: the largest distance from the axis, and the frame's
+/// origin moved along the axis to the middle of the domain.
+struct NativeSize {
+    double radius = 0; // of the surface at the middle of the domain (sphere, torus: its own)
+    double origin_along_z = 0;
+    double v_zero = 0; // uv_file v where the record's v is 0
+    double bound = 0;  // all points are this near to the moved origin
+    double half_angle = 0;
+    bool turned = false; // the axes are turned by pi: the domain lies on the cone's other nappe
+};
+
+NativeSize native_size(const CadSurface& s, const Rect2d& d)
+{
+    const double v_middle = 0.5 * (d.lo.y + d.hi.y), v_half = 0.5 * (d.hi.y - d.lo.y);
+    NativeSize n;
+    switch (s.kind) {
+    case kKindCylinder:
+        n = {s.radius, v_middle, v_middle, std::hypot(s.radius, v_half), 0, false};
+        break;
+    case kKindCone: {
+        const double sin_a = std::sin(s.half_angle), cos_a = std::cos(s.half_angle);
+        const double radius = s.radius + v_middle * sin_a;
+        n = {std::abs(radius),
+             v_middle * cos_a,
+             v_middle,
+             std::hypot(std::abs(radius) + v_half * std::abs(sin_a), v_half * cos_a),
+             radius < 0 ? -s.half_angle : s.half_angle,
+             radius < 0};
+        break;
+    }
+    case kKindSphere:
+        n = {s.radius, 0, 0, s.radius, 0, false};
+        break;
+    default: // torus
+        n = {s.radius, 0, 0, s.radius + s.minor_radius, 0, false};
+        break;
+    }
+    return n;
+}
+
+Status append_plane(const CadSurface& s, const Rect2d& d, const PartFrame& frame, PatchRecord patch,
+                    std::vector<PatchRecord>& patches)
+{
+    const double u = 0.5 * (d.lo.x + d.hi.x), v = 0.5 * (d.lo.y + d.hi.y);
+    const double half_diagonal = 0.5 * std::hypot(d.hi.x - d.lo.x, d.hi.y - d.lo.y);
+    const double unit = place(s.frame.origin + u * s.frame.x + v * s.frame.y, half_diagonal, frame, patch);
+    store(patch.axis_x, s.frame.x);
+    store(patch.axis_y, s.frame.y);
+    store(patch.axis_z, s.frame.z);
+    map_parameter(patch, 0, d.lo.x, d.hi.x, u, unit);
+    map_parameter(patch, 1, d.lo.y, d.hi.y, v, unit);
+    patches.push_back(patch);
+    return Done{};
+}
+
+Status append_quadric_or_torus(const CadSurface& s, const Rect2d& d, const PartFrame& frame, PatchRecord patch,
+                               std::vector<PatchRecord>& patches)
+{
+    const NativeSize size = native_size(s, d);
+    if (!(size.bound > 0) || !(s.radius >= 0) || !(s.minor_radius >= 0))
+        return invalid(s, fmt::format("radius {} (minor {}) gives no surface", s.radius, s.minor_radius));
+    const double unit = place(s.frame.origin + size.origin_along_z * s.frame.z, size.bound, frame, patch);
+    const double u = 0.5 * (d.lo.x + d.hi.x), side = size.turned ? -1 : 1;
+    const double c = side * std::cos(u), si = side * std::sin(u);
+    store(patch.axis_x, c * s.frame.x + si * s.frame.y);
+    store(patch.axis_y, c * s.frame.y - si * s.frame.x);
+    store(patch.axis_z, s.frame.z);
+    patch.param[0] = static_cast<float>(size.radius / unit);
+    if (s.kind == kKindCone)
+        patch.param[1] = static_cast<float>(std::tan(size.half_angle));
+    if (s.kind == kKindTorus)
+        patch.param[1] = static_cast<float>(s.minor_radius / unit);
+    map_parameter(patch, 0, d.lo.x, d.hi.x, u, 1);
+    const bool v_is_length = s.kind == kKindCylinder || s.kind == kKindCone;
+    double lo = d.lo.y, hi = d.hi.y;
+    if (s.kind == kKindTorus) {
+        // the middle of the domain in [0, 2 pi): then an angle in (-pi, pi] needs one turn more or none
+        constexpr double kTurn = 2 * M_PI;
+        const double turns = std::floor(0.5 * (lo + hi) / kTurn);
+        lo -= turns * kTurn;
+        hi -= turns * kTurn;
+    }
+    map_parameter(patch, 1, lo, hi, v_is_length ? size.v_zero : 0, v_is_length ? unit : 1);
+    patches.push_back(patch);
+    return Done{};
+}
+
+/// Centre and half diagonal of the control points' box, in mm.
+struct Hull {
+    Vec3d centre;
+    double half_diagonal = 0;
+};
+
+Hull hull_of(const BezierPatch& bezier)
+{
+    constexpr double kInf = std::numeric_limits<double>::infinity();
+    Vec3d lo{kInf, kInf, kInf}, hi{-kInf, -kInf, -kInf};
+    for (const auto& [x, y, z, w] : bezier.control_points) {
+        lo = {std::min(lo.x, x / w), std::min(lo.y, y / w), std::min(lo.z, z / w)};
+        hi = {std::max(hi.x, x / w), std::max(hi.y, y / w), std::max(hi.z, z / w)};
+    }
+    return {0.5 * (lo + hi), 0.5 * norm(hi - lo)};
+}
+
+std::string bad_number(const BezierPatch& bezier)
+{
+    constexpr double kLargestWeightRatio = 1e30; // a float holds 1e-38 ... 1
+    double heaviest = 0;
+    for (const auto& p : bezier.control_points)
+        heaviest = std::max(heaviest, p[3]);
+    for (const auto& [x, y, z, w] : bezier.control_points) {
+        if (!std::isfinite(x) || !std::isfinite(y) || !std::isfinite(z) || !std::isfinite(w))
+            return "a control point is not finite";
+        if (!(w > 0))
+            return fmt::format("weight {} is not positive", w);
+        if (w * kLargestWeightRatio < heaviest)
+            return fmt::format("weights from {} to {} are too far apart", w, heaviest);
+    }
+    return {};
+}
+
+void append_bezier(const BezierPatch& bezier, const Rect2d& d, const PartFrame& frame, PatchRecord patch,
+                   std::vector<PatchRecord>& patches, std::vector<float>& control_points)
+{
+    const Hull hull = hull_of(bezier);
+    if (!(hull.half_diagonal > 0))
+        return; // all control points are one: no area
+    patch.shape =
+        kKindBezier | uint(bezier.degree_u) << 8 | uint(bezier.degree_v) << 16 | (bezier.rational ? kShapeRational : 0);
+    patch.first_control_point = static_cast<uint>(control_points.size());
+    const double unit = place(hull.centre, hull.half_diagonal, frame, patch);
+    const Vec3d origin = placed_origin_mm(patch, frame);
+    patch.axis_x[0] = patch.axis_y[1] = patch.axis_z[2] = 1;
+    const double u_length = bezier.domain.hi.x - bezier.domain.lo.x, v_length = bezier.domain.hi.y - bezier.domain.lo.y;
+    map_parameter(patch, 0, d.lo.x, d.hi.x, bezier.domain.lo.x, u_length);
+    map_parameter(patch, 1, d.lo.y, d.hi.y, bezier.domain.lo.y, v_length);
+    double heaviest = 0;
+    for (const auto& p : bezier.control_points)
+        heaviest = std::max(heaviest, p[3]);
+    int exponent = 0;
+    std::frexp(heaviest, &exponent);
+    const double weight_unit = bezier.rational ? std::ldexp(1, exponent) : 1; // a power of two: exact
+    for (const auto& [x, y, z, w] : bezier.control_points) {
+        control_points.push_back(static_cast<float>((x - w * origin.x) / (unit * weight_unit)));
+        control_points.push_back(static_cast<float>((y - w * origin.y) / (unit * weight_unit)));
+        control_points.push_back(static_cast<float>((z - w * origin.z) / (unit * weight_unit)));
+        if (bezier.rational)
+            control_points.push_back(static_cast<float>(w / weight_unit));
+    }
+    patches.push_back(patch);
+}
+
+Status append_splines(const CadSurface& s, const Rect2d& d, const PartFrame& frame, const PatchRecord& patch,
+                      std::vector<PatchRecord>& patches, std::vector<float>& control_points)
+{
+    const int degree_u = s.spline.degree_u, degree_v = s.spline.degree_v;
+    if (degree_u < 1 || degree_v < 1 || degree_u > int(kMaxDegree) || degree_v > int(kMaxDegree))
+        return Error{ErrorCode::UnsupportedSurface, s.source_kind,
+                     fmt::format("degree {} x {}; 1 to {} are supported", degree_u, degree_v, kMaxDegree)};
+    const std::vector<BezierPatch> beziers = decompose(s, d);
+    if (beziers.empty())
+        return invalid(s, "the domain lies outside the surface");
+    for (const BezierPatch& bezier : beziers)
+        if (std::string bad = bad_number(bezier); !bad.empty())
+            return Error{ErrorCode::UnsupportedSurface, s.source_kind, std::move(bad)};
+    const size_t before = patches.size();
+    for (const BezierPatch& bezier : beziers)
+        append_bezier(bezier, d, frame, patch, patches, control_points);
+    if (patches.size() == before)
+        return invalid(s, "all control points coincide: the surface has no area");
+    return Done{};
+}
+
+} // namespace
+
+Status append_patches(const CadSurface& surface, const Rect2d& domain, const PartFrame& frame, uint32_t face,
+                      std::vector<PatchRecord>& patches, std::vector<float>& control_points)
+{
+    const Rect2d& d = domain;
+    if (!(d.hi.x > d.lo.x) || !(d.hi.y > d.lo.y) || !std::isfinite(d.hi.x - d.lo.x) || !std::isfinite(d.hi.y - d.lo.y))
+        return invalid(surface,
+                       fmt::format("domain [{}, {}] x [{}, {}] has no finite area", d.lo.x, d.hi.x, d.lo.y, d.hi.y));
+    const CadFrame& f = surface.frame;
+    if (surface.kind != kKindBezier && (!finite(f.origin) || !finite(f.x) || !finite(f.y) || !finite(f.z) ||
+                                        !std::isfinite(surface.radius) || !std::isfinite(surface.minor_radius)))
+        return invalid(surface, "its axes or radii are not finite");
+    PatchRecord patch{};
+    patch.face = face;
+    patch.shape = surface.kind;
+    if (surface.kind == kKindPlane)
+        return append_plane(surface, d, frame, patch, patches);
+    if (surface.kind != kKindBezier)
+        return append_quadric_or_torus(surface, d, frame, patch, patches);
+    return append_splines(surface, d, frame, patch, patches, control_points);
+}
+
+} // namespace trimray

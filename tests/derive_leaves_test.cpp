@@ -1,0 +1,214 @@
+// Leaves tile their patch, and their decoded boxes hold the surface.
+#include "format/derive.h"
+#include "format/leaf_geometry.h"
+#include "tests/random_pack.h"
+
+#include <cmath>
+#include <cstring>
+#include <map>
+
+#include <tbb/global_control.h>
+
+namespace trimray {
+namespace {
+
+using test::random_pack;
+using test::RandomSurfaces;
+
+/// S(u, v) of a record in patch units, from the single-precision numbers it holds, in double. uv_patch.
+Point3 point_of(const PackImage& image, const PatchRecord& patch, double u, double v)
+{
+    const double r = patch.param[0], cu = std::cos(u), su = std::sin(u);
+    switch (patch.shape & 0xffu) {
+    case kKindPlane:
+        return {u, v, 0};
+    case kKindCylinder:
+        return {r * cu, r * su, v};
+    case kKindCone: {
+        const double a = std::atan(double(patch.param[1])), rho = r + v * std::sin(a);
+        return {rho * cu, rho * su, v * std::cos(a)};
+    }
+    case kKindSphere:
+        return {r * std::cos(v) * cu, r * std::cos(v) * su, r * std::sin(v)};
+    case kKindTorus: {
+        const double rho = r + patch.param[1] * std::cos(v);
+        return {rho * cu, rho * su, patch.param[1] * std::sin(v)};
+    }
+    default:
+        break;
+    }
+    // Bernstein sums
+    const int p = int(patch.shape >> 8 & 0xffu), q = int(patch.shape >> 16 & 0xffu);
+    const bool rational = (patch.shape & kShapeRational) != 0;
+    const auto bernstein = [](int n, double t) {
+        std::vector<double> b(n + 1);
+        for (int i = 0; i <= n; ++i)
+            b[i] = std::exp(std::lgamma(n + 1.0) - std::lgamma(i + 1.0) - std::lgamma(n - i + 1.0)) * std::pow(t, i) *
+                   std::pow(1 - t, n - i);
+        return b;
+    };
+    const std::vector<double> bu = bernstein(p, u), bv = bernstein(q, v);
+    double sum[4] = {0, 0, 0, rational ? 0.0 : 1.0};
+    const int floats = rational ? 4 : 3;
+    for (int i = 0; i <= p; ++i)
+        for (int j = 0; j <= q; ++j)
+            for (int c = 0; c < floats; ++c)
+                sum[c] +=
+                    bu[i] * bv[j] * image.control_points[patch.first_control_point + (i * (q + 1) + j) * floats + c];
+    return {sum[0] / sum[3], sum[1] / sum[3], sum[2] / sum[3]};
+}
+
+struct UvRect {
+    double lo[2], hi[2];
+};
+UvRect uv_of(const LeafRecord& leaf)
+{
+    return {{(leaf.uv_lo & 0xffffu) / 32768.0, (leaf.uv_lo >> 16) / 32768.0},
+            {(leaf.uv_hi & 0xffffu) / 32768.0, (leaf.uv_hi >> 16) / 32768.0}};
+}
+
+/// The share of the box's half extents that the point needs; above 1 it is outside.
+double reach_in_box(const OrientedBox& box, const Point3& q)
+{
+    double reach = 0;
+    for (int i = 0; i < 3; ++i) {
+        const Point3 d{q[0] - box.center[0], q[1] - box.center[1], q[2] - box.center[2]};
+        reach = std::max(reach, std::abs(dot3(d, box.axis[i])) / box.half[i]);
+    }
+    return reach;
+}
+
+TEST(derive_leaves, a_million_random_points_lie_inside_their_leafs_box)
+{
+    PackImage image = random_pack(1, 24, 12);
+    derive_leaves(image, LeafOptions{});
+    ASSERT_GT(image.leaves.size(), 1000u);
+    RandomSurfaces random(2);
+    constexpr size_t kSamples = 1'000'000;
+    const size_t per_leaf = kSamples / image.leaves.size() + 1;
+    size_t outside = 0;
+    double tightest = 1e9;
+    for (const LeafRecord& leaf : image.leaves) {
+        const PatchRecord& patch = image.patches[leaf.patch];
+        const OrientedBox box = decode_leaf_box(leaf);
+        const UvRect uv = uv_of(leaf);
+        double used = 0;
+        for (size_t i = 0; i < per_leaf; ++i) {
+            double at[2];
+            for (int c = 0; c < 2; ++c) {
+                // every eighth sample on the border
+                const int side = random.integer(0, 15);
+                const double t = side == 0 ? 0 : side == 1 ? 1 : random.uniform(0, 1);
+                at[c] = uv.lo[c] + t * (uv.hi[c] - uv.lo[c]);
+                if ((patch.shape & 0xffu) != kKindBezier)
+                    at[c] = (at[c] - patch.uv_offset[c]) / patch.uv_scale[c];
+            }
+            const double reach = reach_in_box(box, point_of(image, patch, at[0], at[1]));
+            outside += reach > 1;
+            used = std::max(used, reach);
+        }
+        tightest = std::min(tightest, used);
+    }
+    EXPECT_EQ(outside, 0u);
+    EXPECT_GT(tightest, 0.5) << "a box is much larger than its surface";
+}
+
+TEST(derive_leaves, leaves_tile_their_patch)
+{
+    PackImage image = random_pack(3, 12, 12);
+    derive_leaves(image, LeafOptions{});
+    std::map<uint, double> area;
+    std::map<uint, std::vector<UvRect>> rects;
+    for (const LeafRecord& leaf : image.leaves) {
+        const UvRect r = uv_of(leaf);
+        ASSERT_LT(r.lo[0], r.hi[0]);
+        ASSERT_LT(r.lo[1], r.hi[1]);
+        area[leaf.patch] += (r.hi[0] - r.lo[0]) * (r.hi[1] - r.lo[1]);
+        rects[leaf.patch].push_back(r);
+    }
+    ASSERT_EQ(area.size(), image.patches.size());
+    for (const auto& [patch, sum] : area)
+        EXPECT_EQ(sum, 1.0) << "patch " << patch;
+    RandomSurfaces random(4);
+    for (const auto& [patch, list] : rects) {
+        for (int i = 0; i < 50; ++i) {
+            const double u = random.uniform(0, 1), v = random.uniform(0, 1);
+            int holders = 0;
+            for (const UvRect& r : list)
+                holders += u >= r.lo[0] && u < r.hi[0] && v >= r.lo[1] && v < r.hi[1];
+            ASSERT_EQ(holders, 1);
+        }
+    }
+}
+
+TEST(derive_leaves, parts_own_consecutive_leaves_of_their_own_patches)
+{
+    PackImage image = random_pack(5, 7, 5, 3); // an empty part between others
+    derive_leaves(image, LeafOptions{});
+    EXPECT_EQ(image.parts[3].leaf_count, 0u);
+    for (const PartRecord& part : image.parts) {
+        for (uint i = part.first_leaf; i < part.first_leaf + part.leaf_count; ++i) {
+            EXPECT_GE(image.leaves[i].patch, part.first_patch);
+            EXPECT_LT(image.leaves[i].patch, part.first_patch + part.patch_count);
+        }
+    }
+}
+
+TEST(derive_leaves, the_budget_bounds_the_leaves_of_a_patch_and_flags_what_still_turns)
+{
+    PackImage image = random_pack(6, 2, 12);
+    LeafOptions few;
+    few.max_leaves_per_patch = 4;
+    derive_leaves(image, few);
+    std::map<uint, uint> count;
+    uint flagged = 0;
+    for (const LeafRecord& leaf : image.leaves) {
+        if ((image.patches[leaf.patch].shape & 0xffu) == kKindBezier) {
+            EXPECT_LE(++count[leaf.patch], 4u);
+        }
+        flagged += leaf.quat_z_flags >> 16 & kLeafFlagged;
+    }
+    EXPECT_GT(flagged, 0u);
+    derive_leaves(image, LeafOptions{});
+    uint flagged_with_more = 0;
+    for (const LeafRecord& leaf : image.leaves)
+        flagged_with_more += leaf.quat_z_flags >> 16 & kLeafFlagged;
+    EXPECT_EQ(flagged_with_more, 0u);
+}
+
+TEST(derive_leaves, a_flat_quarter_patch_is_one_leaf_with_a_flat_box)
+{
+    CadSurface s;
+    s.kind = kKindBezier;
+    s.spline = {
+        1, 1, 2, 2, false, {0, 0, 1, 1}, {0, 0, 1, 1}, {{0, 0, 0, 1}, {0, 3, 0, 1}, {2, 0, 0, 1}, {2, 3, 0, 1}}};
+    PackImage image;
+    ASSERT_TRUE(
+        append_patches(s, {{0, 0}, {1, 1}}, PartFrame{{0, 0, 0}, 4}, 0, image.patches, image.control_points).ok());
+    image.parts.push_back({});
+    image.parts[0].patch_count = 1;
+    derive_leaves(image, LeafOptions{});
+    ASSERT_EQ(image.leaves.size(), 1u);
+    const OrientedBox box = decode_leaf_box(image.leaves[0]);
+    // half sides 1 and 1.5 mm of a half diagonal of sqrt(13)/2 mm, one quantum thick
+    std::array<double, 3> half = box.half;
+    std::sort(half.begin(), half.end());
+    EXPECT_LE(half[0], 2 * kLeafQuantum);
+    EXPECT_NEAR(half[1], 2 / std::sqrt(13.0), 3 * kLeafQuantum);
+    EXPECT_NEAR(half[2], 3 / std::sqrt(13.0), 3 * kLeafQuantum);
+}
+
+TEST(derive_leaves, one_thread_and_two_give_the_same_leaves)
+{
+    PackImage one = random_pack(8, 6, 12), two = one;
+    {
+        tbb::global_control limit(tbb::global_control::max_allowed_parallelism, 1);
+        derive_leaves(one, LeafOptions{});
+    }
+    derive_leaves(two, LeafOptions{});
+    ASSERT_EQ(one.leaves.size(), two.leaves.size());
+    EXPECT_EQ(std::memcmp(one.leaves.data(), two.leaves.data(), one.leaves.size() * sizeof(LeafRecord)), 0);
+}
+
+} // namespace
+} // namespace trimray
