@@ -69,11 +69,11 @@ FN scalar anchored(Pair eye, Pair w0, scalar tau, Pair origin)
 {
     Pair product = two_product(tau, w0.hi);
     PRECISE scalar product_lo = product.lo + tau * w0.lo;
-    product = two_sum(product.hi, product_lo);
+    Pair moved = two_sum(product.hi, product_lo); // not `product` again: glslc loops for ever on a precise cycle
     Pair minus_origin;
     minus_origin.hi = -origin.hi;
     minus_origin.lo = -origin.lo;
-    Pair sum = pair_sum(pair_sum(eye, minus_origin), product);
+    Pair sum = pair_sum(pair_sum(eye, minus_origin), moved);
     return sum.hi + sum.lo;
 }
 
