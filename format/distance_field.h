@@ -1,0 +1,37 @@
+// From trim pieces to signed distances, as the paper does it: a binary mask by scan conversion, an exact Euclidean
+// distance transform, samples at texel centres. The mask has an odd number of pixels a texel in each direction, so that
+// each texel's centre is a pixel's centre.
+#pragma once
+
+#include "format/trim_piece.h"
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace trimray {
+
+/// A binary picture of a face's domain. Shapes: inside[y * width + x], row 0 at v = 0. Pixel (x, y) is 1 where its
+/// centre ((x + 0.5) / width, (y + 0.5) / height) is inside by the even-odd rule. What lies around it is outside.
+struct TrimMask {
+    uint width = 0, height = 0;
+    std::vector<uint8_t> inside;
+};
+
+/// The mask of `pieces` (a face's closed loops, uv_face) by scan conversion: crossings of each row's centre line.
+TrimMask scan_convert(std::span<const MonotonePiece> pieces, uint width, uint height);
+
+/// Distances from the centres of every `oversampling`-th pixel (odd; the middle one of each texel) to the nearest
+/// centre of the other kind, positive inside, +-infinity if there is none. Pixels are pixel_u by pixel_v in any unit of
+/// length. Shapes: mask.width / oversampling columns, mask.height / oversampling rows.
+/// Source: Felzenszwalb & Huttenlocher, Distance Transforms of Sampled Functions, 2012 (lower envelope of parabolas).
+std::vector<float> signed_distances(const TrimMask& mask, uint oversampling, double pixel_u, double pixel_v);
+
+/// How far, at most, a point of the loops lies from the nearest pixel centre of either kind: what the mask does not
+/// resolve. Infinite where a loop's inside or outside is thinner than about three pixels and left no pixel.
+double unresolved_distance(const TrimMask& mask, std::span<const MonotonePiece> pieces, double pixel_u, double pixel_v);
+
+/// Pixels a texel in each direction that derive_sdf uses for a texture of this size.
+uint sdf_oversampling(uint width, uint height);
+
+} // namespace trimray

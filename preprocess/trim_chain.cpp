@@ -1,0 +1,367 @@
+#include "preprocess/trim_chain.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace trimray {
+namespace {
+
+/// Mean length of the control net along u per unit of u (along v likewise): an upper bound of the mean speed.
+Vec2d net_speed(const SplineSurface& s)
+{
+    const auto point = [&](int i, int j) {
+        const auto& p = s.control_points[static_cast<size_t>(i) * s.count_v + j];
+        return Vec3d{p[0] / p[3], p[1] / p[3], p[2] / p[3]};
+    };
+    const auto length = [](Vec3d a, Vec3d b) { return std::hypot(a.x - b.x, a.y - b.y, a.z - b.z); };
+    double longest_u = 0, longest_v = 0;
+    for (int j = 0; j < s.count_v; ++j) {
+        double sum = 0;
+        for (int i = 0; i + 1 < s.count_u; ++i)
+            sum += length(point(i, j), point(i + 1, j));
+        longest_u = std::max(longest_u, sum);
+    }
+    for (int i = 0; i < s.count_u; ++i) {
+        double sum = 0;
+        for (int j = 0; j + 1 < s.count_v; ++j)
+            sum += length(point(i, j), point(i, j + 1));
+        longest_v = std::max(longest_v, sum);
+    }
+    return {longest_u / (s.knots_u[s.count_u] - s.knots_u[s.degree_u]),
+            longest_v / (s.knots_v[s.count_v] - s.knots_v[s.degree_v])};
+}
+
+/// |S_u|, |S_v| at v for the native kinds, whose metric depends on v alone; for splines the means of the net.
+Vec2d speed_at(const CadSurface& surface, double v)
+{
+    switch (surface.kind) {
+    case kKindCylinder:
+        return {surface.radius, 1};
+    case kKindCone:
+        return {std::abs(surface.radius + v * std::sin(surface.half_angle)), 1};
+    case kKindSphere:
+        return {surface.radius * std::abs(std::cos(v)), surface.radius};
+    case kKindTorus:
+        return {std::abs(surface.radius + surface.minor_radius * std::cos(v)), surface.minor_radius};
+    case kKindBezier:
+        return net_speed(surface.spline);
+    default:
+        return {1, 1};
+    }
+}
+
+/// One use of an edge, as the walk goes: from start to end, in uv_file without shifts.
+struct Use {
+    const CadEdgeUse* edge = nullptr;
+    bool backwards = false;
+    Vec2d ends[2];
+
+    Vec2d start() const { return ends[backwards ? 1 : 0]; }
+    Vec2d end() const { return ends[backwards ? 0 : 1]; }
+};
+
+/// Where ends meet: distances between parameters, whole periods apart or not.
+class Joints {
+public:
+    Joints(const CadSurface& surface, Vec2d mm_per_uv) : surface_(surface), mm_per_uv_(mm_per_uv) {}
+
+    /// Distance in mm between two parameters as they are. Native surfaces are measured where they are, so that the
+    /// points of a pole are one.
+    double distance(Vec2d a, Vec2d b) const
+    {
+        Vec2d mm = mm_per_uv_;
+        if (surface_.kind != kKindBezier)
+            mm = speed_at(surface_, 0.5 * (a.y + b.y));
+        return std::hypot((a.x - b.x) * mm.x, (a.y - b.y) * mm.y);
+    }
+
+    /// Whole periods that bring `b` nearest to `a`.
+    Vec2d nearest_shift(Vec2d a, Vec2d b) const
+    {
+        const auto periods = [](double from, double to, double period) {
+            return period > 0 ? period * std::round((from - to) / period) : 0.0;
+        };
+        return {periods(a.x, b.x, surface_.period_u), periods(a.y, b.y, surface_.period_v)};
+    }
+
+    /// The shift for `b` to follow `a`: the one in use if that is near enough, else the nearest.
+    Vec2d shift(Vec2d a, Vec2d b, Vec2d current, double near_mm) const
+    {
+        const Vec2d nearest = nearest_shift(a, b);
+        const double kept = distance(a, {b.x + current.x, b.y + current.y});
+        return kept <= near_mm || kept <= distance(a, {b.x + nearest.x, b.y + nearest.y}) ? current : nearest;
+    }
+
+private:
+    const CadSurface& surface_;
+    Vec2d mm_per_uv_;
+};
+
+/// Uses put in order, each with the shift that makes the walk continuous.
+struct PlacedUse {
+    Use use;
+    Vec2d shift;
+};
+using Walk = std::vector<PlacedUse>;
+
+/// Orders the uses of one loop. A loop whose ends meet before all uses are walked is closed, and another begins.
+std::vector<Walk> walk_loop(std::vector<Use> uses, const Joints& joints, double near_mm)
+{
+    std::vector<Walk> walks;
+    while (!uses.empty()) {
+        Walk walk{{uses.front(), {0, 0}}};
+        uses.erase(uses.begin());
+        while (!uses.empty()) {
+            const PlacedUse& last = walk.back();
+            const Vec2d at{last.use.end().x + last.shift.x, last.use.end().y + last.shift.y};
+            const auto gap = [&](Vec2d start) {
+                const Vec2d s = joints.shift(at, start, last.shift, near_mm);
+                return joints.distance(at, {start.x + s.x, start.y + s.y});
+            };
+            size_t best = 0;
+            bool turned = false;
+            double best_gap = gap(uses[0].start());
+            if (best_gap > near_mm) {
+                for (size_t i = 0; i < uses.size(); ++i)
+                    for (const bool turn : {false, true}) {
+                        const double g = gap(turn ? uses[i].end() : uses[i].start());
+                        // the order and direction of the file stand unless another end is clearly nearer
+                        if (g < 0.5 * best_gap) {
+                            best = i;
+                            turned = turn;
+                            best_gap = g;
+                        }
+                    }
+                if (best_gap > near_mm && gap(walk.front().use.start()) <= near_mm)
+                    break;
+            }
+            Use next = uses[best];
+            uses.erase(uses.begin() + static_cast<std::ptrdiff_t>(best));
+            next.backwards = next.backwards != turned;
+            walk.push_back({next, joints.shift(at, next.start(), last.shift, near_mm)});
+        }
+        walks.push_back(std::move(walk));
+    }
+    return walks;
+}
+
+void reverse_pieces(std::vector<CurvePiece>& pieces)
+{
+    std::reverse(pieces.begin(), pieces.end());
+    for (CurvePiece& piece : pieces) {
+        std::swap(piece.p[0], piece.p[3]);
+        std::swap(piece.p[1], piece.p[2]);
+    }
+}
+
+CurvePiece line_piece(Vec2d a, Vec2d b)
+{
+    const auto mix = [&](double t) { return Vec2d{a.x + t * (b.x - a.x), a.y + t * (b.y - a.y)}; };
+    return {{a, mix(1 / 3.0), mix(2 / 3.0), b}, false};
+}
+
+/// Joins the end of `before` with the start of `after`, which is `offset` (whole periods) away in uv. Returns a line if
+/// the gap needs one.
+bool join(CurvePiece& before, CurvePiece& after, Vec2d offset, const CadFace& face, const Joints& joints,
+          const TrimMetric& metric, ChainReport& report, CurvePiece& filler)
+{
+    const Vec2d a = before.p[3], b{after.p[0].x + offset.x, after.p[0].y + offset.y};
+    if (a.x == b.x && a.y == b.y)
+        return false;
+    const double flat_mm = std::hypot((a.x - b.x) * metric.mm_per_uv.x, (a.y - b.y) * metric.mm_per_uv.y);
+    report.largest_gap_mm = std::max(report.largest_gap_mm, joints.distance(a, b));
+    if (flat_mm > metric.tolerance_mm) {
+        filler = line_piece(a, b);
+        if (joints.distance(a, b) > std::max(face.tolerance_mm, metric.tolerance_mm))
+            report.had_open_loop = true;
+        return true;
+    }
+    // the end values are shared: the start moves to the end, or a line that may have no width would be left
+    const Vec2d middle{0.5 * (a.x + b.x), 0.5 * (a.y + b.y)};
+    before.p[3] = middle;
+    after.p[0] = {middle.x - offset.x, middle.y - offset.y};
+    order_points(before);
+    order_points(after);
+    return false;
+}
+
+void grow(Rect2d& r, Vec2d p)
+{
+    r.lo = {std::min(r.lo.x, p.x), std::min(r.lo.y, p.y)};
+    r.hi = {std::max(r.hi.x, p.x), std::max(r.hi.y, p.y)};
+}
+
+constexpr Rect2d kEmptyRect{{1e300, 1e300}, {-1e300, -1e300}};
+
+/// Rectangle of samples of the walk: what the tolerance is relative to.
+void grow_by_samples(Rect2d& r, const PlacedUse& placed)
+{
+    constexpr int kSamples = 32; // a quarter of an arc is seen to 1e-3 of its height
+    const CadEdgeUse& e = *placed.use.edge;
+    for (int i = 0; i <= kSamples; ++i) {
+        const Vec2d p = curve_point(e.pcurve, e.first + (e.last - e.first) * i / kSamples);
+        grow(r, {p.x + placed.shift.x, p.y + placed.shift.y});
+    }
+}
+
+bool usable(const CadEdgeUse& use, std::string& failure)
+{
+    const SplineCurve2d& c = use.pcurve;
+    const size_t n = c.control_points.size();
+    if (c.degree < 1 || c.degree > static_cast<int>(kMaxDegree) || n < static_cast<size_t>(c.degree) + 1 ||
+        c.knots.size() != n + c.degree + 1) {
+        failure = "a pcurve's knots and control points do not fit its degree";
+        return false;
+    }
+    if (!(std::isfinite(use.first) && std::isfinite(use.last)) || !std::is_sorted(c.knots.begin(), c.knots.end()) ||
+        !(c.knots[c.degree] < c.knots[n])) {
+        failure = "a pcurve's knots or range are not finite and increasing";
+        return false;
+    }
+    for (const auto& p : c.control_points)
+        if (!(std::isfinite(p[0]) && std::isfinite(p[1]) && p[2] > 0 && std::isfinite(p[2]))) {
+            failure = "a pcurve's control point is not finite or its weight not positive";
+            return false;
+        }
+    return true;
+}
+
+} // namespace
+
+Rect2d chain_bounds(const std::vector<CurvePiece>& pieces)
+{
+    Rect2d r = kEmptyRect;
+    for (const CurvePiece& piece : pieces) {
+        grow(r, piece.p[0]);
+        grow(r, piece.p[3]);
+    }
+    return r;
+}
+
+double signed_area(const std::vector<CurvePiece>& pieces)
+{
+    if (pieces.empty())
+        return 0;
+    // relative to a point of the chain, so that distant loops keep their digits
+    const Vec2d o = pieces.front().p[0];
+    double twice = 0;
+    const auto cross = [&](Vec2d a, Vec2d b) { return (a.x - o.x) * (b.y - o.y) - (a.y - o.y) * (b.x - o.x); };
+    for (const CurvePiece& piece : pieces) {
+        const Vec2d* p = piece.p;
+        if (piece.cubic) // 2 A = (6 c01 + 3 c02 + c03 + 3 c12 + 3 c13 + 6 c23) / 10, c_ij = p_i x p_j
+            twice += (6 * cross(p[0], p[1]) + 3 * cross(p[0], p[2]) + cross(p[0], p[3]) + 3 * cross(p[1], p[2]) +
+                      3 * cross(p[1], p[3]) + 6 * cross(p[2], p[3])) /
+                     10;
+        else
+            twice += cross(p[0], p[3]);
+    }
+    return 0.5 * twice;
+}
+
+TrimMetric trim_metric(const CadSurface& surface, const Rect2d& domain, double relative_tolerance)
+{
+    TrimMetric metric;
+    Vec2d mm = speed_at(surface, 0.5 * (domain.lo.y + domain.hi.y));
+    const double pi = 3.14159265358979323846;
+    if (surface.kind == kKindCone || surface.kind == kKindTorus || surface.kind == kKindSphere) {
+        mm.x = std::max(speed_at(surface, domain.lo.y).x, speed_at(surface, domain.hi.y).x);
+        // the widest circle may lie between
+        const double period = surface.kind == kKindCone ? 0 : 2 * pi;
+        if (period > 0 && std::floor(domain.hi.y / period) != std::floor(domain.lo.y / period))
+            mm.x = speed_at(surface, 0).x;
+        if (domain.lo.y <= 0 && domain.hi.y >= 0)
+            mm.x = speed_at(surface, 0).x > mm.x ? speed_at(surface, 0).x : mm.x;
+    }
+    // a surface that collapses in a direction still needs a scale for it
+    const double larger = std::max({mm.x, mm.y, 1e-300});
+    metric.mm_per_uv = {std::max(mm.x, 1e-9 * larger), std::max(mm.y, 1e-9 * larger)};
+    metric.longer_side_mm =
+        std::max((domain.hi.x - domain.lo.x) * metric.mm_per_uv.x, (domain.hi.y - domain.lo.y) * metric.mm_per_uv.y);
+    metric.tolerance_mm = relative_tolerance * metric.longer_side_mm;
+    return metric;
+}
+
+std::vector<TrimChain> build_chains(const CadFace& face, double relative_tolerance, TrimMetric& metric,
+                                    ChainReport& report)
+{
+    std::vector<std::vector<Use>> loops;
+    Rect2d rough = kEmptyRect;
+    for (const CadLoop& loop : face.loops) {
+        loops.emplace_back();
+        for (const CadEdgeUse& edge : loop) {
+            if (!usable(edge, report.failure))
+                return {};
+            if (!(edge.first < edge.last))
+                continue; // an edge without length
+            const Use use{
+                &edge, edge.reversed, {curve_point(edge.pcurve, edge.first), curve_point(edge.pcurve, edge.last)}};
+            loops.back().push_back(use);
+            grow_by_samples(rough, {use, {0, 0}});
+        }
+    }
+    const TrimMetric rough_metric = trim_metric(face.surface, rough, relative_tolerance);
+    const Joints joints(face.surface, rough_metric.mm_per_uv);
+    // ends this near belong together: the file's tolerance, or what its curves may be off by when it states none
+    const double near_mm = std::max(2 * face.tolerance_mm, 1e-4 * rough_metric.longer_side_mm);
+    std::vector<Walk> walks;
+    for (std::vector<Use>& uses : loops)
+        for (Walk& walk : walk_loop(std::move(uses), joints, near_mm))
+            walks.push_back(std::move(walk));
+
+    // Unrolled, a loop may cover less than its raw pcurves or more: the tolerance follows the largest loop.
+    Rect2d largest = kEmptyRect;
+    double largest_size = -1;
+    for (const Walk& walk : walks) {
+        Rect2d r = kEmptyRect;
+        for (const PlacedUse& placed : walk)
+            grow_by_samples(r, placed);
+        const double size =
+            std::max((r.hi.x - r.lo.x) * rough_metric.mm_per_uv.x, (r.hi.y - r.lo.y) * rough_metric.mm_per_uv.y);
+        if (size > largest_size) {
+            largest_size = size;
+            largest = r;
+        }
+    }
+    metric = trim_metric(face.surface, largest, relative_tolerance);
+    if (!(metric.longer_side_mm > 0 && std::isfinite(metric.longer_side_mm))) {
+        report.failure = "the loops have no extent";
+        return {};
+    }
+
+    std::vector<TrimChain> chains;
+    for (const Walk& walk : walks) {
+        TrimChain chain;
+        for (const PlacedUse& placed : walk) {
+            const CadEdgeUse& e = *placed.use.edge;
+            CurveFit fit = fit_curve(e.pcurve, e.first, e.last, metric.mm_per_uv, metric.tolerance_mm);
+            if (!fit.finite) {
+                report.failure = "a pcurve has points that are not finite";
+                return {};
+            }
+            report.largest_deviation_mm = std::max(report.largest_deviation_mm, fit.deviation);
+            if (placed.use.backwards)
+                reverse_pieces(fit.pieces);
+            for (CurvePiece& piece : fit.pieces)
+                for (Vec2d& p : piece.p)
+                    p = {p.x + placed.shift.x, p.y + placed.shift.y};
+            CurvePiece filler;
+            if (!chain.pieces.empty() &&
+                join(chain.pieces.back(), fit.pieces.front(), {0, 0}, face, joints, metric, report, filler))
+                chain.pieces.push_back(filler);
+            chain.pieces.insert(chain.pieces.end(), fit.pieces.begin(), fit.pieces.end());
+        }
+        const Vec2d end = chain.pieces.back().p[3], start = chain.pieces.front().p[0];
+        const Vec2d offset = joints.shift(end, start, {0, 0}, near_mm);
+        if (offset.x != 0)
+            chain.winding_u = static_cast<int>(std::lround(offset.x / face.surface.period_u));
+        if (offset.y != 0)
+            chain.winding_v = static_cast<int>(std::lround(offset.y / face.surface.period_v));
+        CurvePiece filler;
+        if (join(chain.pieces.back(), chain.pieces.front(), offset, face, joints, metric, report, filler))
+            chain.pieces.push_back(filler);
+        chains.push_back(std::move(chain));
+    }
+    return chains;
+}
+
+} // namespace trimray

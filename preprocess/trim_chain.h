@@ -1,0 +1,48 @@
+// Edge uses -> closed chains of pieces in uv_file: which end joins which, which period each use belongs to, and how
+// gaps, poles and loops that go once around are closed.
+#pragma once
+
+#include "preprocess/trim_curve.h"
+
+#include <string>
+#include <vector>
+
+namespace trimray {
+
+/// Lengths on the surface per unit of u and of v, in mm: a constant metric that trims are measured in.
+struct TrimMetric {
+    Vec2d mm_per_uv{1, 1}; // the largest over the domain where it varies
+    double tolerance_mm = 0;
+    double longer_side_mm = 0;
+};
+
+/// A closed chain of pieces, ends shared; or one that ends whole periods beyond its start (winding).
+struct TrimChain {
+    std::vector<CurvePiece> pieces;
+    int winding_u = 0, winding_v = 0;
+};
+
+struct ChainReport {
+    bool had_open_loop = false;
+    double largest_gap_mm = 0;
+    double largest_deviation_mm = 0;
+    std::string failure; // not empty: the chains cannot be used, and why
+};
+
+/// The metric of a surface over a rectangle of its parameters.
+TrimMetric trim_metric(const CadSurface& surface, const Rect2d& domain, double relative_tolerance);
+
+/// Fits the pcurves of a face's loops and joins them.
+/// Ends within the tolerance are moved together; a wider gap is closed by a line, and counts as open when it is wider
+/// on the surface than the face's own tolerance (a gap along a pole is no gap). Uses follow each other in the order
+/// given where they meet; otherwise the nearest end goes next, turned around if need be.
+std::vector<TrimChain> build_chains(const CadFace& face, double relative_tolerance, TrimMetric& metric,
+                                    ChainReport& report);
+
+/// Bounding rectangle of the chains' pieces.
+Rect2d chain_bounds(const std::vector<CurvePiece>& pieces);
+
+/// Area enclosed in uv_file, positive for a counter-clockwise chain.
+double signed_area(const std::vector<CurvePiece>& pieces);
+
+} // namespace trimray

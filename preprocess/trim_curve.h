@@ -1,0 +1,37 @@
+// A pcurve -> few lines and cubic Beziers, each monotone in u and in v, within a tolerance: samples dense enough to
+// stand for the curve, cut where it turns, then the longest stretches that one line or one cubic fits.
+#pragma once
+
+#include "preprocess/cad_model.h"
+
+#include <vector>
+
+namespace trimray {
+
+/// A line (points 0 and 3) or a polynomial cubic Bezier in uv; the control points are ordered in u and in v, so the
+/// piece is monotone in both.
+struct CurvePiece {
+    Vec2d p[4];
+    bool cubic = false;
+};
+
+/// Puts the inner points of a cubic in order between its ends, in u and in v; where they were, nothing changes.
+void order_points(CurvePiece& piece);
+
+/// Both halves of `piece` cut at parameter t. Source: de Casteljau.
+void split_piece(const CurvePiece& piece, double t, CurvePiece& before, CurvePiece& after);
+
+/// Point of a B-spline curve at t. Domain: knots[degree] <= t <= knots[n]; outside, the end spans go on.
+Vec2d curve_point(const SplineCurve2d& curve, double t);
+
+struct CurveFit {
+    std::vector<CurvePiece> pieces; // in the order of t, consecutive ends equal
+    double deviation = 0;           // largest distance of the curve's samples from their piece, in the metric
+    bool finite = true;             // false: the curve has a point that is not; no pieces then
+};
+
+/// Fits the curve over [first, last]. A distance is sqrt((metric.x du)^2 + (metric.y dv)^2); `tolerance` is one.
+/// The ends of the first and last piece are the curve's, bit for bit.
+CurveFit fit_curve(const SplineCurve2d& curve, double first, double last, Vec2d metric, double tolerance);
+
+} // namespace trimray
