@@ -1,0 +1,148 @@
+#!/usr/bin/env python3
+"""A second reader of scene packs, from the words of format/SPEC.md alone: shares no code with the first.
+
+usage: second_reader.py PACK    prints one JSON object: header, and each section with the XXH3 of its decoded bytes
+Exit code 3 and one line on stderr where the pack is not valid. Needs libzstd.so.1 and libxxhash.so.0.
+"""
+import ctypes
+import json
+import struct
+import sys
+
+zstd = ctypes.CDLL("libzstd.so.1")
+zstd.ZSTD_decompress.restype = zstd.ZSTD_findFrameCompressedSize.restype = ctypes.c_size_t
+zstd.ZSTD_getFrameContentSize.restype = ctypes.c_ulonglong
+zstd.ZSTD_decompress.argtypes = [ctypes.c_void_p, ctypes.c_size_t, ctypes.c_void_p, ctypes.c_size_t]
+zstd.ZSTD_findFrameCompressedSize.argtypes = [ctypes.c_void_p, ctypes.c_size_t]
+zstd.ZSTD_getFrameContentSize.argtypes = [ctypes.c_void_p, ctypes.c_size_t]
+xxhash = ctypes.CDLL("libxxhash.so.0")
+xxhash.XXH3_64bits.restype = ctypes.c_uint64
+xxhash.XXH3_64bits.argtypes = [ctypes.c_void_p, ctypes.c_size_t]
+
+STRIDES = {"FACT": 112, "prov": 1, "STRS": 1, "p256": 1, "p512": 1, "prox": 1, "TREE": 16, "INST": 112, "PART": 72,
+           "TOPN": 64, "FACE": 136, "drop": 16, "PTCH": 100, "CTRL": 4, "NODE": 64, "LEAF": 32, "TPNT": 8, "TPCE": 4,
+           "CELL": 4, "CENT": 8, "SDFW": 4}
+
+
+class Invalid(Exception):
+    pass
+
+
+def need(condition, what):
+    if not condition:
+        raise Invalid(what)
+
+
+def xxh3(data):
+    return xxhash.XXH3_64bits(data, len(data))
+
+
+def read_header(data):
+    need(len(data) >= 128, "shorter than a header")
+    need(data[:12] == bytes.fromhex("AB5452415920 31BB0D0A1A0A"), "identifier")
+    names = ("major", "minor", "file_size", "decoded_size", "required", "optional", "content_id")
+    header = dict(zip(names, struct.unpack_from("<HHQQQQQ", data, 12)))
+    state, count, table_offset, table_xxh3 = struct.unpack_from("<4sIQQ", data, 56)
+    need(struct.unpack_from("<Q", data, 120)[0] == xxh3(data[:120]), "header checksum")
+    need(header["major"] == 1, "major version")
+    need(state == b"clsd", "not closed")
+    need(header["required"] & ~1 == 0, "required feature")
+    need(header["file_size"] == len(data), "file size")
+    need(data[80:120] == bytes(40), "reserved bytes")
+    need(1 <= count <= 256 and table_offset == 128 and 128 + 80 * count <= len(data), "section table")
+    need(xxh3(data[128:128 + 80 * count]) == table_xxh3, "section table checksum")
+    return header, count
+
+
+def unfilter(frame, stride, delta, planes):
+    n = len(frame) // stride
+    columns = []
+    for c in range(stride // 4):
+        stored = frame[4 * n * c:4 * n * (c + 1)]
+        if planes >> c & 1:
+            stored = bytes(b for word in zip(*(stored[n * k:n * (k + 1)] for k in range(4))) for b in word)
+        words = list(struct.unpack(f"<{n}I", stored))
+        if delta >> c & 1:
+            before = 0
+            for i in range(n):
+                words[i] = before = (words[i] + before) & 0xFFFFFFFF
+        columns.append(words)
+    return struct.pack(f"<{n * len(columns)}I", *(word for record in zip(*columns) for word in record))
+
+
+def decompress(stored, entry):
+    decoded = []
+    frame_size = (1 << 20) // entry["stride"] * entry["stride"]
+    for begin in range(0, entry["decoded_size"], frame_size):
+        size = min(frame_size, entry["decoded_size"] - begin)
+        need(zstd.ZSTD_getFrameContentSize(stored, len(stored)) == size, "content size of a frame")
+        stored_size = zstd.ZSTD_findFrameCompressedSize(stored, len(stored))
+        need(stored_size <= len(stored), "frame")
+        out = ctypes.create_string_buffer(size)
+        need(zstd.ZSTD_decompress(out, size, stored[:stored_size], stored_size) == size, "frame")
+        stored = stored[stored_size:]
+        frame = out.raw
+        decoded.append(unfilter(frame, entry["stride"], entry["delta"], entry["planes"]) if entry["filter"] else frame)
+    need(not stored, "bytes after the last frame")
+    return b"".join(decoded)
+
+
+def read_section(data, at, end):
+    entry = dict(zip(("codec", "filter", "offset", "stored_size", "decoded_size", "count", "stride", "reserved", "delta",
+                      "planes", "stored_xxh3", "decoded_xxh3"), struct.unpack_from("<HHQQQQIIQQQQ", data, at + 4)))
+    entry["id"] = data[at:at + 4].decode("ascii")
+    offset, size = entry["offset"], entry["stored_size"]
+    need(offset == (end + 63) // 64 * 64 and offset + size <= len(data), entry["id"] + ": place")
+    need(not any(data[end:offset]), entry["id"] + ": padding")
+    stored = data[offset:offset + size]
+    need(xxh3(stored) == entry["stored_xxh3"], entry["id"] + ": stored checksum")
+    if entry["id"] not in STRIDES:
+        need(entry["id"][0].islower(), entry["id"] + ": unknown and critical")
+        return entry, None
+    need(entry["stride"] == STRIDES[entry["id"]], entry["id"] + ": stride")
+    need(entry["decoded_size"] == entry["count"] * entry["stride"] and entry["codec"] <= 1, entry["id"] + ": form")
+    content = decompress(stored, entry) if entry["codec"] == 1 else stored
+    need(len(content) == entry["decoded_size"], entry["id"] + ": decoded size")
+    need(xxh3(content) == entry["decoded_xxh3"], entry["id"] + ": decoded checksum")
+    return entry, content
+
+
+def strings_of(content):
+    return [s.decode("utf-8") for s in content.split(b"\0")[:-1]]
+
+
+def read_pack(data):
+    header, count = read_header(data)
+    end, summary, sections, contents = 128 + 80 * count, b"", [], {}
+    for i in range(count):
+        entry, content = read_section(data, 128 + 80 * i, end)
+        end = entry["offset"] + entry["stored_size"]
+        summary += entry["id"].encode() + struct.pack("<QQ", entry["decoded_size"], entry["decoded_xxh3"])
+        sections.append({key: entry[key] for key in ("id", "count", "stored_size", "decoded_size", "decoded_xxh3")})
+        contents[entry["id"]] = content
+    need(end == len(data), "end of the last section")
+    need(xxh3(summary) == header["content_id"], "content id")
+    need(sum(s["decoded_size"] for s in sections) == header["decoded_size"], "total decoded size")
+    return header, sections, contents
+
+
+def describe(header, sections, contents):
+    facts = struct.unpack_from("<10d", contents["FACT"])
+    strings = strings_of(contents.get("STRS", b"\0"))
+    faces = contents.get("FACE") or b""
+    names = [strings[struct.unpack_from("<I", faces, at + 4)[0]] for at in range(0, len(faces), 136)]
+    kinds = [struct.unpack_from("<I", faces, at + 92)[0] for at in range(0, len(faces), 136)]
+    return {"version": f"{header['major']}.{header['minor']}", "content_id": f"{header['content_id']:016x}",
+            "compact": bool(header["required"] & 1), "provenance": strings_of(contents.get("prov", b"")),
+            "bounds_mm": [facts[0:3], facts[3:6]], "faces_by_kind": [kinds.count(k) for k in range(6)],
+            "face_names": sorted(set(names)),
+            "sections": [{**s, "decoded_xxh3": f"{s['decoded_xxh3']:016x}"} for s in sections]}
+
+
+if __name__ == "__main__":
+    try:
+        with open(sys.argv[1], "rb") as file:
+            print(json.dumps(describe(*read_pack(file.read())), ensure_ascii=False))
+    except (Invalid, struct.error, UnicodeDecodeError) as error:
+        print(f"{sys.argv[1]}: not a valid pack: {error}", file=sys.stderr)
+        sys.exit(3)
