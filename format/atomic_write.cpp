@@ -37,25 +37,6 @@ fs::path folder_of(const fs::path& target)
     return target.has_parent_path() ? target.parent_path() : fs::path(".");
 }
 
-/// Removes temporaries `.<name>.<pid>.<random>.tmp` of this target whose process no longer runs.
-void sweep_stale_temporaries(const fs::path& target)
-{
-    const std::string prefix = temporary_prefix(target);
-    constexpr std::string_view kSuffix = ".tmp";
-    std::error_code ignored; // sweeping is a courtesy: a folder that cannot be listed fails at the write, with a reason
-    for (fs::directory_iterator it(folder_of(target), ignored), end; it != end; it.increment(ignored)) {
-        const std::string name = it->path().filename().string();
-        if (!name.starts_with(prefix) || !name.ends_with(kSuffix))
-            continue;
-        pid_t pid = 0;
-        const char* first = name.data() + prefix.size();
-        const auto parsed = std::from_chars(first, name.data() + name.size(), pid);
-        const bool has_pid = parsed.ec == std::errc() && parsed.ptr != name.data() + name.size() && *parsed.ptr == '.';
-        if (has_pid && pid > 0 && ::kill(pid, 0) != 0 && errno == ESRCH)
-            fs::remove(it->path(), ignored);
-    }
-}
-
 /// Closes its file, and removes it unless the rename has happened.
 struct TemporaryFile {
     fs::path path;
@@ -97,6 +78,26 @@ int sync_folder(const fs::path& folder)
 
 } // namespace
 
+// Temporaries are called `.<name>.<pid>.<random>.tmp`.
+void sweep_stale_temporaries(const std::string& path)
+{
+    const fs::path target(path);
+    const std::string prefix = temporary_prefix(target);
+    constexpr std::string_view kSuffix = ".tmp";
+    std::error_code ignored; // sweeping is a courtesy: a folder that cannot be listed fails at the write, with a reason
+    for (fs::directory_iterator it(folder_of(target), ignored), end; it != end; it.increment(ignored)) {
+        const std::string name = it->path().filename().string();
+        if (!name.starts_with(prefix) || !name.ends_with(kSuffix))
+            continue;
+        pid_t pid = 0;
+        const char* first = name.data() + prefix.size();
+        const auto parsed = std::from_chars(first, name.data() + name.size(), pid);
+        const bool has_pid = parsed.ec == std::errc() && parsed.ptr != name.data() + name.size() && *parsed.ptr == '.';
+        if (has_pid && pid > 0 && ::kill(pid, 0) != 0 && errno == ESRCH)
+            fs::remove(it->path(), ignored);
+    }
+}
+
 Status write_file_atomically(const std::string& path, const std::vector<std::byte>& bytes)
 {
     const fs::path target(path);
@@ -105,7 +106,7 @@ Status write_file_atomically(const std::string& path, const std::vector<std::byt
     struct stat existing;
     if (::stat(target.c_str(), &existing) == 0 && !S_ISREG(existing.st_mode))
         return not_writable(target, "target is not a regular file", S_ISDIR(existing.st_mode) ? EISDIR : EINVAL);
-    sweep_stale_temporaries(target);
+    sweep_stale_temporaries(path);
 
     std::random_device random;
     TemporaryFile temporary;

@@ -21,4 +21,7 @@ std::vector<std::byte> encode_pack(const PackImage& image, const WriteOptions& o
 /// appears or nothing does. Sweeps temporaries of dead processes for the same target. Fails: FileNotWritable.
 Status write_file_atomically(const std::string& path, const std::vector<std::byte>& bytes);
 
+/// Removes the temporaries that dead processes left beside `path`.
+void sweep_stale_temporaries(const std::string& path);
+
 } // namespace trimray

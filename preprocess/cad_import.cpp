@@ -142,12 +142,14 @@ Result<CadModel> import_cad(const std::string& path, const ImportOptions& option
     }
     model.instances = std::move(file.instances);
     model.tree = std::move(file.tree);
+    const auto faces_start = std::chrono::steady_clock::now();
     for (size_t i = 0; i < file.parts.size(); ++i) {
         const auto part = static_cast<uint32_t>(i);
         model.parts.push_back(kernel::convert_part(file.parts[i], part, options, model.dropped, progress));
         if (progress)
             progress("faces", static_cast<double>(i + 1) / static_cast<double>(file.parts.size()));
     }
+    model.faces_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - faces_start).count();
     if (options.proxy_deflection > 0) {
         const auto start = std::chrono::steady_clock::now();
         for (size_t i = 0; i < file.parts.size(); ++i) {

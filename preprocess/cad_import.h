@@ -14,6 +14,7 @@ struct ImportOptions {
     bool heal = false;                     // run the kernel's shape healing: slow, off where nothing is lost without it
     bool native_surfaces = true;           // false: every surface as a B-spline, pcurves following (--surfaces bezier)
     double approximation_tolerance_mm = 0; // for offsets and the like; 0: 1e-6 of the part's size
+    std::string name;                      // of the model, where the file gives none; empty: the file's, without ending
     double proxy_deflection = 0.02;        // of the proxy mesh, relative to the part's diagonal; 0: no mesh
 };
 

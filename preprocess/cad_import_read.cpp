@@ -211,9 +211,9 @@ struct DocumentCloser {
     }
 };
 
-std::string stem_of(const std::string& path)
+std::string model_name(const std::string& path, const ImportOptions& options)
 {
-    return std::filesystem::path(path).stem().string();
+    return options.name.empty() ? std::filesystem::path(path).stem().string() : options.name;
 }
 
 Result<LoadedFile> load_step(const std::string& path, const ImportOptions& options, const Progress& progress)
@@ -280,7 +280,7 @@ Result<LoadedFile> load_step(const std::string& path, const ImportOptions& optio
                 "part of the assembly is in another file, {}, which was not found beside it or not readable",
                 it.Key().ToCString()));
     if (transferred)
-        if (const Status walked = walk_document(document, stem_of(path), file); !walked)
+        if (const Status walked = walk_document(document, model_name(path, options), file); !walked)
             return walked.error();
     return file;
 }
@@ -322,12 +322,13 @@ Result<LoadedFile> load_iges(const std::string& path, const ImportOptions& optio
     file.transfer_seconds = seconds_since(transfer_start);
 
     if (transferred)
-        if (const Status walked = walk_document(document, stem_of(path), file); !walked)
+        if (const Status walked = walk_document(document, model_name(path, options), file); !walked)
             return walked.error();
     return file;
 }
 
-Result<LoadedFile> load_brep(const std::string& path, CadFormat format, const Progress& progress)
+Result<LoadedFile> load_brep(const std::string& path, CadFormat format, const ImportOptions& options,
+                             const Progress& progress)
 {
     LoadedFile file;
     file.source_format = "BREP";
@@ -343,7 +344,7 @@ Result<LoadedFile> load_brep(const std::string& path, CadFormat format, const Pr
     if (!done || shape.IsNull())
         return Error{ErrorCode::InvalidCad, path,
                      "begins as BREP but the kernel cannot read it: truncated, or of a newer version; save it again"};
-    if (const Status added = add_bare_shape(shape, stem_of(path), file); !added)
+    if (const Status added = add_bare_shape(shape, model_name(path, options), file); !added)
         return added.error();
     return file;
 }
@@ -383,7 +384,9 @@ Result<CadFormat> detect_format(const std::string& path)
         {"\x7f"
          "ELF"sv,
          "a program"},
-        {"TRAY"sv, "a scene pack already"},
+        {"\xab"
+         "TRAY"sv,
+         "a scene pack already; render or view it as it is"},
     };
     for (const auto& [magic, what] : kOthers)
         if (head.compare(0, magic.size(), magic) == 0)
@@ -414,7 +417,7 @@ Result<LoadedFile> load_file(const std::string& path, CadFormat format, const Im
     case CadFormat::Iges:
         return load_iges(path, options, progress);
     default:
-        return load_brep(path, format, progress);
+        return load_brep(path, format, options, progress);
     }
 }
 

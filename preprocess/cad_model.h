@@ -128,7 +128,7 @@ struct CadModel {
     std::vector<CadDroppedFace> dropped;
     std::vector<std::string> warnings;
     std::string source_format, source_unit; // "STEP AP214", "MM"
-    double read_seconds = 0, transfer_seconds = 0, mesh_seconds = 0;
+    double read_seconds = 0, transfer_seconds = 0, faces_seconds = 0, mesh_seconds = 0;
 };
 
 } // namespace trimray
