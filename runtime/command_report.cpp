@@ -10,15 +10,6 @@
 namespace trimray {
 namespace {
 
-// Messages are one line each: a name with a line break in it must not make two.
-std::string one_line(std::string_view text)
-{
-    std::string line(text);
-    std::replace_if(
-        line.begin(), line.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }, ' ');
-    return line;
-}
-
 /// Optimal string alignment distance: like Levenshtein's, and a swap of neighbours counts one.
 size_t edit_distance(std::string_view a, std::string_view b)
 {
@@ -38,16 +29,29 @@ size_t edit_distance(std::string_view a, std::string_view b)
 
 } // namespace
 
+std::string printable(std::string_view text)
+{
+    std::string line(text);
+    for (char& c : line)
+        if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f)
+            c = ' ';
+    // U+0080..U+009F are control characters too: C2 80..C2 9F in UTF-8
+    for (size_t i = 0; i + 1 < line.size(); ++i)
+        if (line[i] == '\xc2' && static_cast<unsigned char>(line[i + 1]) < 0xa0)
+            line.replace(i, 2, "  ");
+    return line;
+}
+
 int report_error(const Error& error)
 {
-    const std::string where = error.where.empty() ? "" : one_line(error.where) + ": ";
-    fmt::print(stderr, "trimray: {}{} [E{}]\n", where, one_line(error.detail), static_cast<int>(error.code));
+    const std::string where = error.where.empty() ? "" : printable(error.where) + ": ";
+    fmt::print(stderr, "trimray: {}{} [E{}]\n", where, printable(error.detail), static_cast<int>(error.code));
     return exit_code(error);
 }
 
 void report_note(std::string_view text)
 {
-    fmt::print(stderr, "trimray: {}\n", one_line(text));
+    fmt::print(stderr, "trimray: {}\n", printable(text));
 }
 
 std::string nearest_word(std::string_view word, const std::vector<std::string>& candidates)

@@ -10,6 +10,10 @@
 
 namespace trimray {
 
+/// `text` on one line without control characters: names in a hostile file can neither break a line nor steer a
+/// terminal.
+std::string printable(std::string_view text);
+
 /// Prints `trimray: <where>: <detail> [E<number>]` on stderr. Returns the exit code of the error's class.
 int report_error(const Error& error);
 

@@ -54,6 +54,7 @@ std::string encode_exr(uint32_t width, uint32_t height, const std::vector<std::s
     spec.z_channel = spec.channelindex("Z");
     spec.attribute("compression", "zip");
     spec.attribute("oiio:ColorSpace", "Linear");
+    spec.attribute("DateTime", ""); // without one OpenImageIO writes the time: the same frame gives the same bytes
     return encode("exr", spec, OIIO::TypeDesc::FLOAT, pixels, bytes);
 }
 
@@ -61,12 +62,13 @@ std::string decode_png(const std::byte* bytes, size_t size, uint32_t& width, uin
                        std::vector<uint8_t>& rgba)
 {
     OIIO::Filesystem::IOMemReader memory(const_cast<std::byte*>(bytes), size);
-    OIIO::ImageSpec config;
-    config.attribute("oiio:UnassociatedAlpha", 1);
-    const std::unique_ptr<OIIO::ImageInput> in = OIIO::ImageInput::open("memory.png", &config, &memory);
+    const std::unique_ptr<OIIO::ImageInput> in = OIIO::ImageInput::create("png");
     if (!in)
-        return OIIO::geterror();
-    const OIIO::ImageSpec& spec = in->spec();
+        return "OpenImageIO cannot read png: " + OIIO::geterror();
+    OIIO::ImageSpec config, spec;
+    config.attribute("oiio:UnassociatedAlpha", 1);
+    if (!in->set_ioproxy(&memory) || !in->open("memory.png", spec, config))
+        return in->geterror();
     if (spec.nchannels != 4)
         return "expected 4 channels, found " + std::to_string(spec.nchannels);
     width = static_cast<uint32_t>(spec.width);

@@ -86,7 +86,8 @@ int run(const std::vector<std::string>& arguments)
     int exit_code = kExitOk;
     for (const ExternalCommand& command : external_commands())
         register_external(app, command);
-    register_version(app, exit_code);
+    for (const auto register_command : {register_info, register_validate, register_version})
+        register_command(app, exit_code);
 
     if (arguments.empty()) {
         fmt::print("{}", app.help());

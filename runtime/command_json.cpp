@@ -1,0 +1,45 @@
+#include "runtime/command_json.h"
+
+#include <fmt/format.h>
+
+namespace trimray {
+namespace {
+
+template <class T>
+uint64_t bytes_of(const std::vector<T>& array)
+{
+    return array.size() * sizeof(T);
+}
+
+} // namespace
+
+void print_json(const Json& object)
+{
+    fmt::print("{}\n", object.dump(-1, ' ', false, Json::error_handler_t::replace));
+}
+
+MemoryBytes memory_bytes(const PackImage& image)
+{
+    MemoryBytes bytes;
+    bytes.geometry = bytes_of(image.parts) + bytes_of(image.instances) + bytes_of(image.faces) +
+                     bytes_of(image.patches) + bytes_of(image.control_points);
+    bytes.bvh = bytes_of(image.leaves) + bytes_of(image.top_nodes) + bytes_of(image.part_nodes);
+    bytes.trim_exact = bytes_of(image.trim_points) + bytes_of(image.trim_pieces) + bytes_of(image.cells) +
+                       bytes_of(image.cell_entries);
+    bytes.trim_sdf = bytes_of(image.sdf_words);
+    return bytes;
+}
+
+Json to_json(const MemoryBytes& bytes)
+{
+    return {{"geometry", bytes.geometry}, {"bvh", bytes.bvh},         {"trim_exact", bytes.trim_exact},
+            {"trim_sdf", bytes.trim_sdf}, {"trim_kd", bytes.trim_kd}, {"total", bytes.total()}};
+}
+
+const std::string& string_at(const PackImage& image, uint index)
+{
+    static const std::string none;
+    return index < image.strings.strings.size() ? image.strings.strings[index] : none;
+}
+
+} // namespace trimray
