@@ -157,8 +157,13 @@ struct FaceRecord {
     uint surface_kind;  // kKind of the file's surface (kKindBezier for all splines, sweeps and offsets)
     uint loop_count;
     uint reserved;
+#ifdef __cplusplus
     double domain_lo[2]; // uv_file of uv_face (0,0) and (1,1)
     double domain_hi[2];
+#else
+    uvec2 domain_lo[2]; // the same bytes: no shader reads them, and a device may lack doubles
+    uvec2 domain_hi[2];
+#endif
 };
 
 #ifdef __cplusplus

@@ -1,0 +1,231 @@
+#include "runtime/vk_scene.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <span>
+#include <string>
+
+namespace trimray {
+
+namespace {
+
+using Vec3 = std::array<double, 3>;
+
+Vec3 operator+(const Vec3& a, const Vec3& b)
+{
+    return {a[0] + b[0], a[1] + b[1], a[2] + b[2]};
+}
+Vec3 operator-(const Vec3& a, const Vec3& b)
+{
+    return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+}
+Vec3 operator*(const Vec3& a, double s)
+{
+    return {a[0] * s, a[1] * s, a[2] * s};
+}
+double dot(const Vec3& a, const Vec3& b)
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+Vec3 cross(const Vec3& a, const Vec3& b)
+{
+    return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
+double length(const Vec3& a)
+{
+    return std::sqrt(dot(a, a));
+}
+
+void store(const Vec3& v, float (&out)[3])
+{
+    for (int i = 0; i < 3; ++i)
+        out[i] = static_cast<float>(v[i]);
+}
+void store_pair(const Vec3& v, float (&hi)[3], float (&lo)[3])
+{
+    for (int i = 0; i < 3; ++i) {
+        hi[i] = static_cast<float>(v[i]);
+        lo[i] = static_cast<float>(v[i] - static_cast<double>(hi[i]));
+    }
+}
+
+// A node without children: the tree of a part or scene that holds nothing.
+BvhNode empty_node()
+{
+    BvhNode node{};
+    std::fill(std::begin(node.child), std::end(node.child), kBvhEmpty);
+    return node;
+}
+
+// Nodes on the longest path from the root of a tree. Validation has bounded it by kMaxBvhDepth.
+uint32_t tree_depth(std::span<const BvhNode> nodes)
+{
+    if (nodes.empty())
+        return 1; // the empty node
+    struct Level {
+        uint32_t node;
+        uint32_t depth;
+    };
+    uint32_t deepest = 0;
+    std::vector<Level> waiting{{0, 1}};
+    while (!waiting.empty()) {
+        const Level at = waiting.back();
+        waiting.pop_back();
+        deepest = std::max(deepest, at.depth);
+        for (const uint32_t child : nodes[at.node].child)
+            if (child != kBvhEmpty && !(child & kBvhLeaf))
+                waiting.push_back({child, at.depth + 1});
+    }
+    return deepest;
+}
+
+template <class T>
+std::span<const std::byte> bytes_of(const std::vector<T>& values)
+{
+    return std::as_bytes(std::span(values));
+}
+
+// Part mm to world mm and back, without the translation.
+struct Linear {
+    Vec3 row[3];
+    Vec3 operator()(const Vec3& v) const { return {dot(row[0], v), dot(row[1], v), dot(row[2], v)}; }
+};
+
+} // namespace
+
+SceneFacts scene_facts(const PackImage& image)
+{
+    SceneFacts facts;
+    for (const PatchRecord& patch : image.patches) {
+        const uint32_t kind = patch.shape & 0xffu;
+        facts.kinds |= 1u << kind;
+        if (kind != kKindBezier)
+            continue;
+        const uint32_t points = (((patch.shape >> 8) & 0xffu) + 1) * (((patch.shape >> 16) & 0xffu) + 1);
+        const bool rational = (patch.shape & kShapeRational) != 0;
+        if (rational)
+            facts.features |= kFeatureRational;
+        facts.largest_net_floats = std::max(facts.largest_net_floats, points * (rational ? 4u : 3u));
+    }
+    for (const FaceRecord& face : image.faces) {
+        if (face.flags & kFaceNaturalBorder)
+            continue;
+        facts.features |= kFeatureTrims;
+        facts.trims_have_cells = facts.trims_have_cells && face.grid != 0;
+        facts.trims_have_textures = facts.trims_have_textures && face.sdf_size != 0;
+    }
+    uint32_t part_depth = 1;
+    for (const PartRecord& part : image.parts)
+        part_depth =
+            std::max(part_depth, tree_depth(std::span(image.part_nodes).subspan(part.first_node, part.node_count)));
+    // a visit takes one and leaves up to four, on each level; a root is one; the part's root comes on top
+    facts.stack_size = 3 * (tree_depth(image.top_nodes) + part_depth) + 2;
+    return facts;
+}
+
+Result<std::array<VulkanBuffer, kFrameBindings>> upload_scene(VulkanDevice& device, const PackImage& image)
+{
+    std::vector<BvhNode> top_nodes = image.top_nodes;
+    if (top_nodes.empty())
+        top_nodes.push_back(empty_node());
+    std::vector<BvhNode> part_nodes = image.part_nodes;
+    part_nodes.push_back(empty_node()); // for parts without any, see frame_setup
+
+    struct Array {
+        uint32_t binding;
+        std::span<const std::byte> bytes;
+        const char* name;
+    };
+    const Array arrays[] = {
+        {kBindTopNodes, bytes_of(top_nodes), "the top tree"},
+        {kBindPartNodes, bytes_of(part_nodes), "the parts' trees"},
+        {kBindLeaves, bytes_of(image.leaves), "the leaves"},
+        {kBindPatches, bytes_of(image.patches), "the patches"},
+        {kBindControlPoints, bytes_of(image.control_points), "the control points"},
+        {kBindFaces, bytes_of(image.faces), "the faces"},
+        {kBindCells, bytes_of(image.cells), "the trim cells"},
+        {kBindCellEntries, bytes_of(image.cell_entries), "the trim cells' entries"},
+        {kBindTrimPoints, bytes_of(image.trim_points), "the trim points"},
+        {kBindSdfWords, bytes_of(image.sdf_words), "the distance textures"},
+    };
+    std::array<VulkanBuffer, kFrameBindings> buffers;
+    for (const Array& array : arrays) {
+        Result<VulkanBuffer> buffer = upload_storage(device, array.bytes, array.name);
+        if (!buffer)
+            return buffer.error();
+        buffers[array.binding] = std::move(*buffer);
+    }
+    return buffers;
+}
+
+Result<FrameSetup> frame_setup(const PackImage& image, const RenderOptions& options)
+{
+    const CameraRays rays = camera_rays(options.camera, options.width, options.height);
+    const double middle[2] = {0.5 * options.width, 0.5 * options.height};
+    const Vec3 through_middle = rays.corner + rays.step_x * middle[0] + rays.step_y * middle[1];
+    const double per_length = 1.0 / length(through_middle);
+
+    FrameSetup setup;
+    setup.w0 = through_middle * per_length;
+    setup.step_x = rays.step_x * per_length;
+    setup.step_y = rays.step_y * per_length;
+
+    FrameView& view = setup.view;
+    const Vec3 world_origin = std::to_array(image.world_origin_mm);
+    const double top_tau = dot(world_origin - rays.eye, setup.w0);
+    store((rays.eye + setup.w0 * top_tau - world_origin) * (1.0 / image.world_scale_mm), view.top_origin);
+    view.top_tau = static_cast<float>(top_tau);
+    view.per_world_scale = static_cast<float>(1.0 / image.world_scale_mm);
+    store(setup.w0, view.w0);
+    store(setup.step_x, view.step_x);
+    store(setup.step_y, view.step_y);
+    view.middle[0] = static_cast<float>(middle[0]);
+    view.middle[1] = static_cast<float>(middle[1]);
+    view.width = options.width;
+    view.height = options.height;
+    view.error_px = options.error_px;
+
+    setup.instances.resize(std::max<size_t>(image.instances.size(), 1));
+    for (size_t i = 0; i < image.instances.size(); ++i) {
+        const InstanceRecord& record = image.instances[i];
+        const PartRecord& part = image.parts[record.part];
+        const double* m = record.transform;
+        const Vec3 column[3] = {{m[0], m[4], m[8]}, {m[1], m[5], m[9]}, {m[2], m[6], m[10]}};
+        const Vec3 translation = {m[3], m[7], m[11]};
+        // rows of the inverse = cofactors over the determinant; they are also the columns of the inverse transpose
+        const double determinant = dot(column[0], cross(column[1], column[2]));
+        if (determinant == 0 || !std::isfinite(1.0 / determinant))
+            return Error{ErrorCode::InvalidPack, fmt::format("instance {}", i), "its transform has no inverse"};
+        const Linear inverse{{cross(column[1], column[2]) * (1.0 / determinant),
+                              cross(column[2], column[0]) * (1.0 / determinant),
+                              cross(column[0], column[1]) * (1.0 / determinant)}};
+        const double per_scale = 1.0 / part.scale_mm;
+        const Vec3 eye = (inverse(rays.eye - translation) - std::to_array(part.origin_mm)) * per_scale;
+        const Vec3 w0 = inverse(setup.w0) * per_scale;
+        const Vec3 step_x = inverse(setup.step_x) * per_scale;
+        const Vec3 step_y = inverse(setup.step_y) * per_scale;
+
+        FrameInstance& instance = setup.instances[i];
+        store_pair(eye, instance.eye_hi, instance.eye_lo);
+        store_pair(w0, instance.w0_hi, instance.w0_lo);
+        store(step_x, instance.step_x);
+        store(step_y, instance.step_y);
+        instance.node_tau = static_cast<float>(-dot(eye, w0) / dot(w0, w0)); // nearest to the part's origin
+        store(eye + w0 * static_cast<double>(instance.node_tau), instance.node_origin);
+        // only directions of normals matter: scaled to about 1
+        const double size = std::max({length(inverse.row[0]), length(inverse.row[1]), length(inverse.row[2])});
+        store(inverse.row[0] * (1.0 / size), instance.normal_x);
+        store(inverse.row[1] * (1.0 / size), instance.normal_y);
+        store(inverse.row[2] * (1.0 / size), instance.normal_z);
+        instance.footprint = static_cast<float>(std::min(length(step_x), length(step_y)));
+        instance.first_node = part.node_count > 0 ? part.first_node : static_cast<uint32_t>(image.part_nodes.size());
+        instance.first_leaf = part.first_leaf;
+        instance.color_rgba = record.color_rgba;
+    }
+    return setup;
+}
+
+} // namespace trimray

@@ -1,0 +1,41 @@
+// A scene's arrays on a Vulkan device, and the facts to which the shader is specialised.
+#pragma once
+
+#include "format/result.h"
+#include "runtime/camera.h"
+#include "runtime/tracer.h"
+#include "runtime/vk_buffer.h"
+#include "runtime/vk_device.h"
+#include "shaders/frame_layout.h"
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+namespace trimray {
+
+/// What the pack holds, as far as the shader cares.
+struct SceneFacts {
+    uint32_t kinds = 0;    // bit kKind...
+    uint32_t features = 0; // kFeatureTrims, kFeatureRational
+    bool trims_have_cells = true;
+    bool trims_have_textures = true; // of all trimmed faces
+    uint32_t stack_size = 0;         // waiting children at most, top tree and deepest part together
+    uint32_t largest_net_floats = 0; // of a Bezier patch
+};
+SceneFacts scene_facts(const PackImage& image);
+
+/// The pack's arrays by binding (shaders/frame_layout.h); the bindings of a frame's own buffers stay empty.
+/// Fails: DeviceFailed.
+Result<std::array<VulkanBuffer, kFrameBindings>> upload_scene(VulkanDevice& device, const PackImage& image);
+
+/// The view of a frame and its instances as the shader wants them, computed in double.
+struct FrameSetup {
+    FrameView view{};
+    std::vector<FrameInstance> instances; // never empty: a scene without any gets one that nothing refers to
+    std::array<double, 3> w0{}, step_x{}, step_y{};
+};
+/// Fails: InvalidPack (an instance whose transform has no inverse).
+Result<FrameSetup> frame_setup(const PackImage& image, const RenderOptions& options);
+
+} // namespace trimray

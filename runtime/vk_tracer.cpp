@@ -1,0 +1,381 @@
+// The Vulkan tracer: uploads a scene once, then traces each frame in bands of rows, one dispatch of primary.comp a
+// band, and reads the last frame's pixels back.
+#include "runtime/tracer.h"
+#include "runtime/vk_buffer.h"
+#include "runtime/vk_device.h"
+#include "runtime/vk_pipeline.h"
+#include "runtime/vk_scene.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cstring>
+#include <limits>
+#include <utility>
+
+namespace trimray {
+
+namespace {
+
+const uint32_t kPrimarySpirv[] =
+#include "primary.comp.inc"
+    ;
+
+// Bounds the memory of a band and the time of a dispatch, which some drivers end after a second or two
+constexpr size_t kBandBytes = size_t{32} << 20;
+
+// The software driver ends an invocation's loops in silence after 65,535 iterations. What walk() does not count (its
+// last round, shading) takes less than the difference.
+constexpr uint32_t kSoftwareIterationLimit = 60000;
+
+// Larger nets are read from the buffer on the software driver too: so many floats lie beside each invocation
+constexpr uint32_t kMostLocalFloats = 1024;
+
+struct QueryPool {
+    const VulkanDevice* device = nullptr;
+    VkQueryPool handle = VK_NULL_HANDLE;
+    ~QueryPool()
+    {
+        if (device)
+            device->vk().vkDestroyQueryPool(device->handle(), handle, nullptr);
+    }
+};
+
+class VulkanTracer : public Tracer {
+public:
+    VulkanTracer(std::shared_ptr<const Scene> scene, std::unique_ptr<VulkanDevice> device)
+        : device_(std::move(device)), scene_(std::move(scene)), facts_(scene_facts(scene_->pack.image))
+    {
+    }
+
+    Status upload();
+    std::string device_name() const override { return device_->name(); }
+    Result<Frame> render(const RenderOptions& options, RenderStats& stats) override;
+
+private:
+    using Specialisation = std::array<uint32_t, kFrameSpecs>;
+
+    Result<TrimMode> choose_trim(TrimMode wanted) const;
+    Result<ComputePipeline*> pipeline(TrimMode trim, bool shade, bool count);
+    Status prepare_frame(const FrameSetup& setup, uint32_t rows_per_band);
+    Status clear_counts();
+    Result<std::array<uint64_t, kFrameCounts>> read_counts();
+    Result<double> trace_band(const ComputePipeline& pipeline, const FrameView& view, bool read_back);
+    Result<double> trace_frame(const ComputePipeline& pipeline, FrameView view, uint32_t rows_per_band, Frame* frame);
+    void take_pixels(const FrameView& view, Frame& frame) const;
+
+    std::unique_ptr<VulkanDevice> device_; // first: everything below must be gone before it
+    std::shared_ptr<const Scene> scene_;
+    SceneFacts facts_;
+    std::array<VulkanBuffer, kFrameBindings> buffers_;
+    VulkanBuffer readback_;
+    VulkanBuffer counts_readback_;
+    QueryPool timestamps_;
+    std::vector<std::pair<Specialisation, ComputePipeline>> pipelines_;
+};
+
+Status VulkanTracer::upload()
+{
+    Result<std::array<VulkanBuffer, kFrameBindings>> buffers = upload_scene(*device_, scene_->pack.image);
+    if (!buffers)
+        return buffers.error();
+    buffers_ = std::move(*buffers);
+    const size_t count_bytes = kFrameCounts * 2 * sizeof(uint32_t);
+    Result<VulkanBuffer> counts = VulkanBuffer::create(*device_, BufferUse::Storage, count_bytes, "the work counts");
+    if (!counts)
+        return counts.error();
+    buffers_[kBindCounts] = std::move(*counts);
+    Result<VulkanBuffer> counts_readback =
+        VulkanBuffer::create(*device_, BufferUse::Readback, count_bytes, "the work counts");
+    if (!counts_readback)
+        return counts_readback.error();
+    counts_readback_ = std::move(*counts_readback);
+
+    if (device_->timestamp_bits() > 0) {
+        auto info = vk_struct<VkQueryPoolCreateInfo>(VK_STRUCTURE_TYPE_QUERY_POOL_CREATE_INFO);
+        info.queryType = VK_QUERY_TYPE_TIMESTAMP;
+        info.queryCount = 2;
+        const VkResult result = device_->vk().vkCreateQueryPool(device_->handle(), &info, nullptr, &timestamps_.handle);
+        if (result != VK_SUCCESS)
+            return vk_failure("vkCreateQueryPool", result);
+        timestamps_.device = device_.get();
+    }
+    return device_->validation_status();
+}
+
+// Auto is exact: of the right modes the one that needs no texture. A mode that the pack has no data for is refused.
+Result<TrimMode> VulkanTracer::choose_trim(TrimMode wanted) const
+{
+    const TrimMode mode = wanted == TrimMode::Auto ? TrimMode::Exact : wanted;
+    if (mode == TrimMode::Kd)
+        return Error{ErrorCode::UnsupportedPackFeature, "--trim kd",
+                     "the kd baseline runs on the CPU only; use --device cpu, or --trim exact"};
+    if (mode == TrimMode::Sdf && !facts_.trims_have_textures)
+        return Error{ErrorCode::UnsupportedPackFeature, "--trim sdf",
+                     "the pack has faces without a distance texture; use --trim exact, or pack with --trim-memory"};
+    if (mode != TrimMode::Sdf && !facts_.trims_have_cells)
+        return Error{ErrorCode::UnsupportedPackFeature, "--trim", "the pack has trimmed faces without cells"};
+    return mode;
+}
+
+Result<ComputePipeline*> VulkanTracer::pipeline(TrimMode trim, bool shade, bool count)
+{
+    Specialisation constants{};
+    constants[kSpecTrimMode] = trim == TrimMode::Sdf      ? kTrimByTexture
+                               : trim == TrimMode::Hybrid ? kTrimByBoth
+                                                          : kTrimByCells;
+    constants[kSpecKinds] = facts_.kinds;
+    constants[kSpecFeatures] = facts_.features | (shade ? kFeatureShade : 0) | (count ? kFeatureCount : 0);
+    constants[kSpecStackSize] = facts_.stack_size;
+    if (device_->is_software()) {
+        constants[kSpecLocalFloats] = facts_.largest_net_floats <= kMostLocalFloats ? facts_.largest_net_floats : 0;
+        constants[kSpecIterationLimit] = kSoftwareIterationLimit;
+    }
+    for (auto& [made_for, made] : pipelines_)
+        if (made_for == constants)
+            return &made;
+    Result<ComputePipeline> made =
+        ComputePipeline::create(*device_, kPrimarySpirv, kFrameBindings, sizeof(FrameView), constants);
+    if (!made)
+        return made.error();
+    pipelines_.reserve(16); // pointers handed out stay good; the modes are fewer
+    pipelines_.emplace_back(constants, std::move(*made));
+    return &pipelines_.back().second;
+}
+
+// Uploads the instances as the frame sees them and makes the buffers of a band's pixels, if those there are too small.
+Status VulkanTracer::prepare_frame(const FrameSetup& setup, uint32_t rows_per_band)
+{
+    Result<VulkanBuffer> instances =
+        upload_storage(*device_, std::as_bytes(std::span(setup.instances)), "the instances");
+    if (!instances)
+        return instances.error();
+    buffers_[kBindInstances] = std::move(*instances);
+    const size_t band_bytes = size_t{rows_per_band} * setup.view.width * sizeof(FramePixel);
+    if (buffers_[kBindPixels].size_bytes() < band_bytes) {
+        Result<VulkanBuffer> pixels = VulkanBuffer::create(*device_, BufferUse::Storage, band_bytes, "the picture");
+        if (!pixels)
+            return pixels.error();
+        buffers_[kBindPixels] = std::move(*pixels);
+        Result<VulkanBuffer> readback = VulkanBuffer::create(*device_, BufferUse::Readback, band_bytes, "the picture");
+        if (!readback)
+            return readback.error();
+        readback_ = std::move(*readback);
+    }
+    return Done{};
+}
+
+Status VulkanTracer::clear_counts()
+{
+    return device_->run([&](VkCommandBuffer commands) {
+        device_->vk().vkCmdFillBuffer(commands, buffers_[kBindCounts].handle(), 0, VK_WHOLE_SIZE, 0);
+    });
+}
+
+Result<std::array<uint64_t, kFrameCounts>> VulkanTracer::read_counts()
+{
+    const Status copied = device_->run([&](VkCommandBuffer commands) {
+        const VkBufferCopy region{0, 0, counts_readback_.size_bytes()};
+        device_->vk().vkCmdCopyBuffer(commands, buffers_[kBindCounts].handle(), counts_readback_.handle(), 1, &region);
+    });
+    if (!copied)
+        return copied.error();
+    if (const Status seen = counts_readback_.invalidate(); !seen)
+        return seen.error();
+    std::array<uint64_t, kFrameCounts> counts{};
+    for (uint32_t i = 0; i < kFrameCounts; ++i) {
+        uint32_t words[2];
+        std::memcpy(words, counts_readback_.mapped() + i * sizeof words, sizeof words);
+        counts[i] = words[0] | uint64_t{words[1]} << 32;
+    }
+    return counts;
+}
+
+// Traces one band and returns its milliseconds on the device, or on the host's clock where the queue has no timestamps.
+Result<double> VulkanTracer::trace_band(const ComputePipeline& pipeline, const FrameView& view, bool read_back)
+{
+    const VolkDeviceTable& vk = device_->vk();
+    const auto start = std::chrono::steady_clock::now();
+    const Status traced = device_->run([&](VkCommandBuffer commands) {
+        if (timestamps_.device) {
+            vk.vkCmdResetQueryPool(commands, timestamps_.handle, 0, 2);
+            vk.vkCmdWriteTimestamp(commands, VK_PIPELINE_STAGE_TOP_OF_PIPE_BIT, timestamps_.handle, 0);
+        }
+        pipeline.dispatch(commands, std::as_bytes(std::span(&view, 1)), (view.width + kGroupSide - 1) / kGroupSide,
+                          (view.row_count + kGroupSide - 1) / kGroupSide);
+        if (timestamps_.device)
+            vk.vkCmdWriteTimestamp(commands, VK_PIPELINE_STAGE_BOTTOM_OF_PIPE_BIT, timestamps_.handle, 1);
+    });
+    if (!traced)
+        return traced.error();
+    double ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+    if (timestamps_.device) {
+        uint64_t ticks[2] = {0, 0};
+        const VkResult result =
+            vk.vkGetQueryPoolResults(device_->handle(), timestamps_.handle, 0, 2, sizeof ticks, ticks, sizeof ticks[0],
+                                     VK_QUERY_RESULT_64_BIT | VK_QUERY_RESULT_WAIT_BIT);
+        if (result != VK_SUCCESS)
+            return vk_failure("vkGetQueryPoolResults", result);
+        const uint64_t mask =
+            device_->timestamp_bits() >= 64 ? ~uint64_t{0} : (uint64_t{1} << device_->timestamp_bits()) - 1;
+        const double nanoseconds_per_tick = device_->properties().limits.timestampPeriod;
+        ms = static_cast<double>((ticks[1] - ticks[0]) & mask) * nanoseconds_per_tick * 1e-6;
+    }
+    if (read_back) {
+        const Status copied = device_->run([&](VkCommandBuffer commands) {
+            const VkBufferCopy region{0, 0, size_t{view.width} * view.row_count * sizeof(FramePixel)};
+            vk.vkCmdCopyBuffer(commands, buffers_[kBindPixels].handle(), readback_.handle(), 1, &region);
+        });
+        if (!copied)
+            return copied.error();
+        if (const Status seen = readback_.invalidate(); !seen)
+            return seen.error();
+    }
+    return ms;
+}
+
+// Traces all bands; `frame` may be null, then nothing is read back. Returns milliseconds.
+Result<double> VulkanTracer::trace_frame(const ComputePipeline& pipeline, FrameView view, uint32_t rows_per_band,
+                                         Frame* frame)
+{
+    double ms = 0;
+    for (view.first_row = 0; view.first_row < view.height; view.first_row += rows_per_band) {
+        view.row_count = std::min(rows_per_band, view.height - view.first_row);
+        const Result<double> band_ms = trace_band(pipeline, view, frame != nullptr);
+        if (!band_ms)
+            return band_ms.error();
+        ms += *band_ms;
+        if (frame)
+            take_pixels(view, *frame);
+    }
+    return ms;
+}
+
+// Copies a band's pixels from the readback buffer to the frame's rows.
+void VulkanTracer::take_pixels(const FrameView& view, Frame& frame) const
+{
+    const PackImage& image = scene_->pack.image;
+    const size_t first = size_t{view.first_row} * view.width;
+    const size_t count = size_t{view.row_count} * view.width;
+    for (size_t i = 0; i < count; ++i) {
+        FramePixel pixel;
+        std::memcpy(&pixel, readback_.mapped() + i * sizeof pixel, sizeof pixel);
+        const size_t at = first + i;
+        std::copy_n(pixel.rgba, 4, &frame.rgba[4 * at]);
+        frame.certified[at] = (pixel.status & kPixelCertified) != 0;
+        if (!(pixel.status & kPixelHit))
+            continue;
+        frame.depth_mm[at] = pixel.depth_mm;
+        std::copy_n(pixel.normal, 3, &frame.normal[3 * at]);
+        const FaceRecord& face = image.faces[pixel.face];
+        for (int k = 0; k < 2; ++k)
+            frame.uv[2 * at + k] = static_cast<float>(face.domain_lo[k] + static_cast<double>(pixel.uv_face[k]) *
+                                                                              (face.domain_hi[k] - face.domain_lo[k]));
+        frame.face[at] = static_cast<int32_t>(pixel.face);
+        frame.instance[at] = static_cast<int32_t>(pixel.instance);
+    }
+}
+
+Result<Frame> VulkanTracer::render(const RenderOptions& options, RenderStats& stats)
+{
+    const Result<TrimMode> trim = choose_trim(options.trim);
+    if (!trim)
+        return trim.error();
+    const VkPhysicalDeviceLimits& limits = device_->properties().limits;
+    const size_t row_bytes = size_t{options.width} * sizeof(FramePixel);
+    const size_t band_bytes = std::min<size_t>(kBandBytes, limits.maxStorageBufferRange);
+    if (options.width == 0 || options.height == 0 || row_bytes > band_bytes)
+        return Error{ErrorCode::Usage, "--size",
+                     fmt::format("{}x{}: at least 1x1, and at most {} wide on this device", options.width,
+                                 options.height, band_bytes / sizeof(FramePixel))};
+    const auto rows_per_band = static_cast<uint32_t>(std::min<size_t>(
+        {options.height, band_bytes / row_bytes, size_t{limits.maxComputeWorkGroupCount[1]} * kGroupSide}));
+
+    const Result<FrameSetup> setup = frame_setup(scene_->pack.image, options);
+    if (!setup)
+        return setup.error();
+    if (const Status ready = prepare_frame(*setup, rows_per_band); !ready)
+        return ready.error();
+
+    // With one frame it counts its work itself; with more an untimed one before them does
+    const uint32_t frames = std::max(options.frames, 1u);
+    const bool count_apart = frames > 1;
+    const Result<ComputePipeline*> counting = pipeline(*trim, options.shade, true);
+    if (!counting)
+        return counting.error();
+    const Result<ComputePipeline*> timed = pipeline(*trim, options.shade, !count_apart);
+    if (!timed)
+        return timed.error();
+    std::array<const VulkanBuffer*, kFrameBindings> bound{};
+    for (uint32_t i = 0; i < kFrameBindings; ++i)
+        bound[i] = &buffers_[i];
+    (*counting)->set_buffers(bound);
+    (*timed)->set_buffers(bound);
+    // an empty band: drivers that compile at the first dispatch do it here
+    if (const Result<double> warm = trace_band(**timed, setup->view, false); !warm)
+        return warm.error();
+
+    if (const Status cleared = clear_counts(); !cleared)
+        return cleared.error();
+    if (count_apart)
+        if (const Result<double> ms = trace_frame(**counting, setup->view, rows_per_band, nullptr); !ms)
+            return ms.error();
+    Frame frame;
+    const size_t pixels = size_t{options.width} * options.height;
+    frame.width = options.width;
+    frame.height = options.height;
+    frame.rgba.assign(4 * pixels, 0.0f);
+    frame.depth_mm.assign(pixels, std::numeric_limits<float>::infinity());
+    frame.normal.assign(3 * pixels, 0.0f);
+    frame.uv.assign(2 * pixels, 0.0f);
+    frame.face.assign(pixels, -1);
+    frame.instance.assign(pixels, -1);
+    frame.certified.assign(pixels, 0);
+    stats = RenderStats{};
+    stats.device = device_->name();
+    stats.trim = *trim;
+    for (uint32_t i = 0; i < frames; ++i) {
+        const bool last = i + 1 == frames;
+        const Result<double> ms = trace_frame(**timed, setup->view, rows_per_band, last ? &frame : nullptr);
+        if (!ms)
+            return ms.error();
+        stats.frame_ms.push_back(*ms);
+    }
+
+    const Result<std::array<uint64_t, kFrameCounts>> counts = read_counts();
+    if (!counts)
+        return counts.error();
+    if ((*counts)[kCountStopped] > 0)
+        return Error{ErrorCode::DeviceFailed, device_->name(),
+                     fmt::format("the rays of {} pixels need more loop iterations than this software driver runs; use "
+                                 "--device cpu",
+                                 (*counts)[kCountStopped])};
+    stats.work.rays = (*counts)[kCountRays];
+    stats.work.node_visits = (*counts)[kCountNodes];
+    stats.work.leaf_visits = (*counts)[kCountLeaves];
+    stats.work.newton_steps = (*counts)[kCountNewton];
+    stats.work.curve_tests = (*counts)[kCountCurves];
+    stats.work.uncertified_pixels =
+        static_cast<uint64_t>(std::count(frame.certified.begin(), frame.certified.end(), uint8_t{0}));
+    if (const Status valid = device_->validation_status(); !valid)
+        return valid.error();
+    return frame;
+}
+
+} // namespace
+
+Result<std::unique_ptr<Tracer>> make_vulkan_tracer(std::shared_ptr<const Scene> scene, bool allow_software,
+                                                   bool validation)
+{
+    Result<std::unique_ptr<VulkanDevice>> device = VulkanDevice::create(allow_software, validation);
+    if (!device)
+        return device.error();
+    auto tracer = std::make_unique<VulkanTracer>(std::move(scene), std::move(*device));
+    if (const Status ready = tracer->upload(); !ready)
+        return ready.error();
+    return std::unique_ptr<Tracer>(std::move(tracer));
+}
+
+} // namespace trimray

@@ -1,0 +1,118 @@
+// What passes between the host and primary.comp beside the pack's own arrays: the view, the instances seen from it, a
+// pixel's result and the work counts. Scalar block layout, 4-byte fields.
+//
+// Pixel (x, y) looks along w = w0 + dx step_x + dy step_y, where dx, dy are pixels from the picture's middle and
+// |w0| = 1 in the world; a point of its ray is eye + tau w in every space, and its distance is tau |w in the world|
+// (shaders/shared/precision.h).
+#ifndef TRIMRAY_FRAME_LAYOUT_H
+#define TRIMRAY_FRAME_LAYOUT_H
+
+#include "format/pack_layout.h"
+
+#ifdef __cplusplus
+namespace trimray {
+#endif
+
+// Push constants. Vectors are the world's; the top tree's ray is top_origin + (tau - top_tau) w0 / world_scale + ...
+struct FrameView {
+    float top_origin[3]; // eye + top_tau w0, in the top tree's units: the part of the view's axis near the scene
+    float top_tau;
+    float per_world_scale; // the top tree's units per mm
+    float w0[3];
+    float step_x[3];
+    float step_y[3];
+    float middle[2]; // dx = x + 0.5 - middle
+    uint width;
+    uint height;    // of the whole picture
+    uint first_row; // of this band
+    uint row_count;
+    float error_px; // Newton stops at this share of a pixel's footprint
+    float background[3];
+};
+
+// An instance seen from the eye, in its part's units.
+struct FrameInstance {
+    float eye_hi[3]; // eye = hi + lo
+    float eye_lo[3];
+    float w0_hi[3];
+    float w0_lo[3];
+    float step_x[3];
+    float step_y[3];
+    // the part of the ray near the part: node_origin + (tau - node_tau) w, node_origin = eye + node_tau w0
+    float node_origin[3];
+    float node_tau;
+    float normal_x[3]; // world normal = columns (normal_x, normal_y, normal_z) times the part's; inverse transpose
+    float normal_y[3];
+    float normal_z[3];
+    float footprint; // a pixel's width at tau = 1, part units
+    uint first_node; // of the part, in all parts' nodes
+    uint first_leaf;
+    uint color_rgba; // sRGB bytes; alpha 0: the default
+};
+
+struct FramePixel {
+    float depth_mm; // along the ray; kNoDepth: a miss
+    float normal[3];
+    float uv_face[2];
+    uint face;
+    uint instance;
+    uint status; // kPixel flags
+    float rgba[4];
+};
+TRIMRAY_CONST uint kPixelHit = 1u;
+TRIMRAY_CONST uint kPixelCertified = 2u;
+TRIMRAY_CONST uint kPixelStopped = 4u; // the driver's loop limit was near, so the walk was ended
+
+// Sums over a frame as pairs of words, low word first; kCount is the pair.
+TRIMRAY_CONST uint kCountRays = 0u;
+TRIMRAY_CONST uint kCountNodes = 1u;
+TRIMRAY_CONST uint kCountLeaves = 2u;
+TRIMRAY_CONST uint kCountNewton = 3u;
+TRIMRAY_CONST uint kCountCurves = 4u;
+TRIMRAY_CONST uint kCountStopped = 5u;
+TRIMRAY_CONST uint kFrameCounts = 6u;
+
+// Specialisation constants of primary.comp, by constant_id
+TRIMRAY_CONST uint kSpecTrimMode = 0u; // kTrimBy
+TRIMRAY_CONST uint kSpecKinds = 1u;    // bit kKind...: the pack holds such patches
+TRIMRAY_CONST uint kSpecFeatures = 2u; // kFeature bits
+TRIMRAY_CONST uint kSpecStackSize = 3u;
+TRIMRAY_CONST uint kSpecLocalFloats = 4u; // control points are copied into an array of so many floats; 0: they are not
+TRIMRAY_CONST uint kSpecIterationLimit = 5u; // loop iterations a subgroup may run; 0: no limit
+TRIMRAY_CONST uint kFrameSpecs = 6u;
+
+TRIMRAY_CONST uint kTrimByCells = 0u;
+TRIMRAY_CONST uint kTrimByTexture = 1u;
+TRIMRAY_CONST uint kTrimByBoth = 2u; // the texture outside its band, the cells inside
+
+TRIMRAY_CONST uint kFeatureTrims = 1u;    // some face has trims
+TRIMRAY_CONST uint kFeatureRational = 2u; // some Bezier patch is rational
+TRIMRAY_CONST uint kFeatureShade = 4u;
+TRIMRAY_CONST uint kFeatureCount = 8u; // work counts are wanted
+
+TRIMRAY_CONST uint kGroupSide = 8u; // workgroups are 8 x 8 pixels
+
+// Bindings of primary.comp
+TRIMRAY_CONST uint kBindInstances = 0u;
+TRIMRAY_CONST uint kBindTopNodes = 1u;
+TRIMRAY_CONST uint kBindPartNodes = 2u;
+TRIMRAY_CONST uint kBindLeaves = 3u;
+TRIMRAY_CONST uint kBindPatches = 4u;
+TRIMRAY_CONST uint kBindControlPoints = 5u;
+TRIMRAY_CONST uint kBindFaces = 6u;
+TRIMRAY_CONST uint kBindCells = 7u;
+TRIMRAY_CONST uint kBindCellEntries = 8u;
+TRIMRAY_CONST uint kBindTrimPoints = 9u;
+TRIMRAY_CONST uint kBindSdfWords = 10u;
+TRIMRAY_CONST uint kBindPixels = 11u;
+TRIMRAY_CONST uint kBindCounts = 12u;
+TRIMRAY_CONST uint kFrameBindings = 13u;
+
+#ifdef __cplusplus
+static_assert(sizeof(FrameView) == 96);
+static_assert(sizeof(FrameInstance) == 140);
+static_assert(sizeof(FramePixel) == 52);
+} // namespace trimray
+#endif
+
+#endif

@@ -1,0 +1,220 @@
+// A ray against one leaf: into the patch's space, the leaf's box, the roots, the face's domain and its trims.
+
+// uv_face may leave [0,1] by the rounding of an angle (2.5e-7 of 2 pi) and of uv_scale: patches meet without a gap
+const float kDomainSlack = 4e-6f;
+// Newton may end outside of its leaf by this much of uv_patch, so that neighbouring leaves overlap
+const float kUvOverlap = 1e-5f;
+const int kNewtonSteps = 12;
+const float kNewtonReach = 3.0f; // half sides of the leaf: farther from its middle the start is not this leaf's
+const float kResidualFloor = 4.0f * kRounding; // patch units: the rounding of a point with |q| about 1
+const uint kCurveIterations = 32u;             // bound of left_of_cubic
+const uint kTorusIterations = 3u * 24u + 4u * 32u; // bound of torus_roots
+
+// The nearest hit so far
+struct Hit {
+    float tau; // kHuge: none yet
+    float t;   // the same along the patch's ray
+    vec2 uv_face;
+    vec2 uv_patch;
+    uint leaf;
+    uint instance;
+};
+
+struct PatchRay {
+    vec3 origin; // patch space; the point at tau = anchor
+    vec3 direction;
+    float anchor;
+};
+
+// Source: shaders/shared/precision.h
+PatchRay patch_ray(FrameInstance instance, PatchRecord patch, vec2 pixel)
+{
+    vec3 w0 = vector(instance.w0_hi);
+    precise vec3 across = pixel.x * vector(instance.step_x) + pixel.y * vector(instance.step_y);
+    PatchRay ray;
+    ray.anchor = dot(vector(patch.origin_hi) - vector(instance.eye_hi), w0) / dot(w0, w0);
+    vec3 middle;
+    for (int axis = 0; axis < 3; ++axis) {
+        Pair eye = Pair(instance.eye_hi[axis], instance.eye_lo[axis]);
+        Pair w = Pair(instance.w0_hi[axis], instance.w0_lo[axis]);
+        Pair origin = Pair(patch.origin_hi[axis], patch.origin_lo[axis]);
+        middle[axis] = anchored(eye, w, ray.anchor, origin);
+    }
+    float per_scale = 1.0f / patch.scale;
+    vec3 axis_x = vector(patch.axis_x);
+    vec3 axis_y = vector(patch.axis_y);
+    vec3 axis_z = vector(patch.axis_z);
+    ray.origin = project(axis_x, axis_y, axis_z, middle + ray.anchor * across) * per_scale;
+    ray.direction = project(axis_x, axis_y, axis_z, w0 + across) * per_scale;
+    return ray;
+}
+
+bool inside_trims(FaceRecord face, vec2 uv)
+{
+    if (!has_feature(kFeatureTrims) || (face.flags & kFaceNaturalBorder) != 0u)
+        return true;
+    TrimFace trim = trim_face(face);
+    if (trim_mode != kTrimByCells && trim.sdf_width > 0u) {
+        float distance_texels = sdf_distance(trim, uv);
+        if (trim_mode == kTrimByTexture || abs(distance_texels) > face.sdf_band_texels)
+            return distance_texels > 0.0f;
+    }
+    uint word = cell_word(trim, uv);
+    bool inside = cell_says_inside(word);
+    if (!cell_is_mixed(word))
+        return inside;
+    uint at = cell_first_entry(trim, word);
+    for (;;) {
+        CellEntry entry = cell_entries[at];
+        inside = differ(inside, entry_crossed(trim, entry.word, entry.eta, uv));
+        ++curve_tests;
+        iterations += 1u + kCurveIterations;
+        if (entry_is_last(entry.word))
+            return inside;
+        ++at;
+    }
+}
+
+// Takes the root at t if it is in front of the eye, nearer than what was found, in the domain and inside the trims.
+void offer_root(PatchRay ray, FaceRecord face, uint leaf, uint instance, float t, vec2 uv_patch, vec2 uv_face,
+                inout Hit hit)
+{
+    float tau = ray.anchor + t;
+    if (!(tau > 0.0f) || !(tau < hit.tau))
+        return;
+    vec2 inside = clamp(uv_face, vec2(0.0f), vec2(1.0f));
+    vec2 outside = abs(uv_face - inside);
+    if (max(outside.x, outside.y) > kDomainSlack || !inside_trims(face, inside))
+        return;
+    hit.tau = tau;
+    hit.t = t;
+    hit.uv_face = inside;
+    hit.uv_patch = uv_patch;
+    hit.leaf = leaf;
+    hit.instance = instance;
+}
+
+// uv_patch of a point of a native surface
+vec2 native_uv(uint kind, PatchRecord patch, vec3 p)
+{
+    switch (kind) {
+    case kKindCylinder:
+        return cylinder_uv(p);
+    case kKindCone:
+        return cone_uv(patch.param[0], patch.param[1], p);
+    case kKindSphere:
+        return sphere_uv(p);
+    case kKindTorus:
+        return torus_uv(patch.param[0], patch.param[1], p);
+    default:
+        return plane_uv(p);
+    }
+}
+
+vec2 face_uv(PatchRecord patch, uint kind, vec2 uv_patch)
+{
+    vec2 scale = vec2(patch.uv_scale[0], patch.uv_scale[1]);
+    vec2 uv = vec2(patch.uv_offset[0], patch.uv_offset[1]) + scale * uv_patch;
+    // the torus' second angle, unwrapped as pack_layout.h says
+    bool wrapped = kind == kKindTorus && uv.y < 0.5f - kPi * scale.y;
+    return vec2(uv.x, wrapped ? uv.y + 2.0f * kPi * scale.y : uv.y);
+}
+
+void native_hit(PatchRay ray, PatchRecord patch, FaceRecord face, uint kind, uint leaf, uint instance, inout Hit hit)
+{
+    float r = patch.param[0];
+    float second = patch.param[1];
+    vec4 roots = vec4(kHuge);
+    if (kind == kKindPlane && has_kind(kKindPlane))
+        roots.x = plane_roots(ray.origin, ray.direction).t0;
+    else if (kind == kKindTorus && has_kind(kKindTorus)) {
+        TorusRoots found = torus_roots(r, second, ray.origin, ray.direction);
+        roots = vec4(found.t0, found.t1, found.t2, found.t3);
+        iterations += kTorusIterations;
+    } else {
+        RootPair found = RootPair(kHuge, kHuge);
+        if (kind == kKindCylinder && has_kind(kKindCylinder))
+            found = cylinder_roots(r, ray.origin, ray.direction);
+        else if (kind == kKindCone && has_kind(kKindCone))
+            found = cone_roots(r, second, ray.origin, ray.direction);
+        else if (kind == kKindSphere && has_kind(kKindSphere))
+            found = sphere_roots(r, ray.origin, ray.direction);
+        roots.xy = vec2(found.t0, found.t1);
+    }
+    for (int i = 0; i < 4; ++i) {
+        if (roots[i] >= kHuge)
+            continue;
+        vec2 uv_patch = native_uv(kind, patch, ray.origin + roots[i] * ray.direction);
+        offer_root(ray, face, leaf, instance, roots[i], uv_patch, face_uv(patch, kind, uv_patch), hit);
+    }
+    iterations += 4u;
+}
+
+// Loop iterations of one bezier_point, as its loops stand
+uint bezier_iterations(uint degree_u, uint degree_v)
+{
+    return degree_u * (degree_u + 1u) / 2u + degree_v * (degree_v + 1u) / 2u + (degree_u + 1u) * (degree_v + 2u);
+}
+
+void copy_control_points(PatchRecord patch, uint count)
+{
+    local_first = patch.first_control_point;
+    for (uint i = 0u; i < count && i < local_floats; ++i)
+        local_points[i] = control_points[local_first + i];
+    iterations += count;
+}
+
+void bezier_hit(PatchRay ray, PatchRecord patch, FaceRecord face, LeafBox box, float footprint, uint leaf,
+                uint instance, inout Hit hit)
+{
+    uint degree_u = (patch.shape >> 8) & 0xffu;
+    uint degree_v = (patch.shape >> 16) & 0xffu;
+    bool rational = has_feature(kFeatureRational) && (patch.shape & kShapeRational) != 0u;
+    if (local_floats > 0u)
+        copy_control_points(patch, (degree_u + 1u) * (degree_v + 1u) * (rational ? 4u : 3u));
+    RayPlanes planes = ray_planes(ray.origin, ray.direction);
+    vec2 middle = 0.5f * (box.uv_lo + box.uv_hi);
+    vec2 reach = 0.5f * (box.uv_hi - box.uv_lo);
+    vec2 uv = middle;
+    float per_direction = 1.0f / dot(ray.direction, ray.direction);
+    uint work = bezier_iterations(degree_u, degree_v);
+    for (int step = 0; step < kNewtonSteps; ++step) {
+        SurfacePoint s = bezier_point(patch.first_control_point, int(degree_u), int(degree_v), rational, uv);
+        NewtonStep next = newton_step(s, planes, uv);
+        ++newton_steps;
+        iterations += work + 1u;
+        // not `precise`: glslc follows precise values around this loop for ever
+        float t = dot(s.p - ray.origin, ray.direction) * per_direction;
+        float allowed = max(view.error_px * footprint * max(ray.anchor + t, 0.0f), kResidualFloor);
+        if (next.residual <= allowed) {
+            vec2 off = abs(uv - middle);
+            if (off.x <= reach.x + kUvOverlap && off.y <= reach.y + kUvOverlap)
+                offer_root(ray, face, leaf, instance, t, uv, face_uv(patch, kKindBezier, uv), hit);
+            return;
+        }
+        if (next.singular)
+            return;
+        // far outside of the leaf there is nothing to find
+        uv = clamp(next.uv, middle - kNewtonReach * reach, middle + kNewtonReach * reach);
+    }
+}
+
+void leaf_hit(uint leaf, uint instance_index, FrameInstance instance, vec2 pixel, inout Hit hit)
+{
+    LeafRecord record = leaves[leaf];
+    PatchRecord patch = patches[record.patch];
+    PatchRay ray = patch_ray(instance, patch, pixel);
+    LeafBox box = decode_leaf(record);
+    float margin = 4.0f * kRounding * (1.0f + length(ray.origin));
+    BoxHit in_box = leaf_box_hit(box, ray.origin, ray.direction, margin);
+    if (!in_box.hit || ray.anchor + in_box.far < 0.0f || ray.anchor + in_box.near > hit.tau)
+        return;
+    ++leaf_visits;
+    uint kind = patch.shape & 0xffu;
+    FaceRecord face = faces[patch.face];
+    if (kind == kKindBezier) {
+        if (has_kind(kKindBezier))
+            bezier_hit(ray, patch, face, box, instance.footprint / patch.scale, leaf, instance_index, hit);
+    } else
+        native_hit(ray, patch, face, kind, leaf, instance_index, hit);
+}

@@ -1,0 +1,51 @@
+// The pack's arrays as the shader sees them, and the fetch_* functions through which shaders/shared reads them.
+layout(scalar, set = 0, binding = kBindInstances) readonly buffer Instances { FrameInstance instances[]; };
+layout(scalar, set = 0, binding = kBindTopNodes) readonly buffer TopNodes { BvhNode top_nodes[]; };
+layout(scalar, set = 0, binding = kBindPartNodes) readonly buffer PartNodes { BvhNode part_nodes[]; };
+layout(scalar, set = 0, binding = kBindLeaves) readonly buffer Leaves { LeafRecord leaves[]; };
+layout(scalar, set = 0, binding = kBindPatches) readonly buffer Patches { PatchRecord patches[]; };
+layout(scalar, set = 0, binding = kBindControlPoints) readonly buffer ControlPoints { float control_points[]; };
+layout(scalar, set = 0, binding = kBindFaces) readonly buffer Faces { FaceRecord faces[]; };
+layout(scalar, set = 0, binding = kBindCells) readonly buffer Cells { uint cells[]; };
+layout(scalar, set = 0, binding = kBindCellEntries) readonly buffer CellEntries { CellEntry cell_entries[]; };
+layout(scalar, set = 0, binding = kBindTrimPoints) readonly buffer TrimPoints { vec2 trim_points[]; };
+layout(scalar, set = 0, binding = kBindSdfWords) readonly buffer SdfWords { uint sdf_words[]; };
+layout(scalar, set = 0, binding = kBindPixels) writeonly buffer Pixels { FramePixel pixels[]; };
+layout(scalar, set = 0, binding = kBindCounts) buffer Counts { uint counts[]; };
+layout(scalar, push_constant) uniform View { FrameView view; };
+
+// Specialised to what the pack holds and the frame asks for: what is false here costs no instruction.
+layout(constant_id = kSpecTrimMode) const uint trim_mode = 0u;
+layout(constant_id = kSpecKinds) const uint kinds = 0x3fu;
+layout(constant_id = kSpecFeatures) const uint features = 0xffu;
+layout(constant_id = kSpecStackSize) const uint stack_size = 290u; // 2 trees of kMaxBvhDepth, 3 waiting children a node
+layout(constant_id = kSpecLocalFloats) const uint local_floats = 1u;
+layout(constant_id = kSpecIterationLimit) const uint iteration_limit = 0u;
+
+// A patch's control points copied beside the invocation, where the driver reads buffers slowly
+const uint local_size = local_floats > 0u ? local_floats : 1u;
+float local_points[local_size];
+uint local_first = 0u;
+
+float fetch_control(uint at)
+{
+    if (local_floats > 0u)
+        return local_points[at - local_first];
+    return control_points[at];
+}
+uint fetch_cell(uint at) { return cells[at]; }
+uint fetch_entry_word(uint at) { return cell_entries[at].word; }
+float fetch_entry_eta(uint at) { return cell_entries[at].eta; }
+vec2 fetch_trim_point(uint at) { return trim_points[at]; }
+uint fetch_sdf_word(uint at) { return sdf_words[at]; }
+
+vec3 vector(float v[3]) { return vec3(v[0], v[1], v[2]); }
+bool has_kind(uint kind) { return (kinds & (1u << kind)) != 0u; }
+bool has_feature(uint feature) { return (features & feature) != 0u; }
+
+// Work of this invocation. `iterations` bounds the loop iterations of the leaf at hand from above.
+uint node_visits = 0u;
+uint leaf_visits = 0u;
+uint newton_steps = 0u;
+uint curve_tests = 0u;
+uint iterations = 0u;
