@@ -62,13 +62,20 @@ struct SectionEntry {
 };
 static_assert(sizeof(SectionEntry) == 80);
 
-inline constexpr uint64_t kSectionAlignment = 64;
 inline constexpr uint64_t kFrameBytes = 1ull << 20; // largest decoded size of a zstd frame
 inline constexpr uint32_t kMaxSections = 256;
 inline constexpr uint32_t kMaxStride = 4096;
 inline constexpr uint64_t kMaxElements = 0x7fffffffull; // indices are 32 bits, and bit 31 marks leaves
 inline constexpr uint64_t kMaxPictureBytes = 64ull << 20;
 inline constexpr uint32_t kMaxLeavesPerPatch = 1u << 16;
+
+/// Plain sections lie where a mapping or an upload can use them as they are; compressed ones are only read through.
+inline constexpr uint64_t kPlainAlignment = 64;
+inline constexpr uint64_t kCompressedAlignment = 8;
+inline uint64_t section_alignment(const SectionEntry& entry)
+{
+    return entry.codec == kCodecPlain ? kPlainAlignment : kCompressedAlignment;
+}
 
 /// Whole records that fit a frame; every frame of a section but its last holds this many.
 inline uint64_t records_per_frame(uint32_t stride)

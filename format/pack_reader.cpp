@@ -245,14 +245,15 @@ private:
     bool check_place(const SectionEntry& e, uint64_t end)
     {
         const uint64_t size = source_.size();
-        if (e.offset % kSectionAlignment != 0 || e.offset < end || e.offset - end >= kSectionAlignment ||
-            e.offset > size || e.stored_bytes > size - e.offset) {
+        const uint64_t alignment = section_alignment(e);
+        if (e.offset % alignment != 0 || e.offset < end || e.offset - end >= alignment || e.offset > size ||
+            e.stored_bytes > size - e.offset) {
             fault(3113, id_of(e),
                   fmt::format("{} bytes at offset {}; expected within {} bytes, at the first multiple of {} from {}",
-                              e.stored_bytes, e.offset, size, kSectionAlignment, end));
+                              e.stored_bytes, e.offset, size, alignment, end));
             return false;
         }
-        std::byte padding[kSectionAlignment];
+        std::byte padding[kPlainAlignment];
         const std::span gap(padding, e.offset - end);
         if (!source_.read(end, gap)) {
             fault(3100, id_of(e), "the file became shorter while it was read");

@@ -7,6 +7,7 @@
 #include <cassert>
 #include <cstring>
 #include <memory>
+#include <optional>
 
 #include <tbb/parallel_for.h>
 #include <xxhash.h>
@@ -54,10 +55,21 @@ Bytes compress_frame(ByteSpan content, int level)
     return frame;
 }
 
-/// The smallest of the four forms of each column, judged by a fast compression of the section's first frame.
-ColumnFilter choose_filter(ByteSpan decoded, uint32_t stride)
+/// Small sections take the strongest level: the time cannot be noticed, and in small packs the bytes can.
+int level_for(size_t bytes, int level)
 {
-    constexpr int kTrialLevel = 3; // its ranking is that of the final level nearly always, at a tenth of the time
+    constexpr size_t kSmall = 256u << 10;
+    return bytes <= kSmall ? std::max(level, ZSTD_maxCLevel()) : level;
+}
+
+constexpr int kTrialLevel = 3; // its ranking is that of higher levels nearly always, at a tenth of the time
+
+/// The smallest of the four forms of each column, judged by a fast compression of the section's first frame; nothing
+/// where the records as they are come out smaller.
+std::optional<ColumnFilter> choose_filter(ByteSpan decoded, uint32_t stride)
+{
+    if (stride % 4 != 0 || stride > 4 * kMaxFilterColumns)
+        return std::nullopt;
     const size_t n = std::min<size_t>(decoded.size() / stride, records_per_frame(stride));
     const uint32_t column_count = stride / 4;
     std::vector<int> best_form(column_count);
@@ -80,6 +92,12 @@ ColumnFilter choose_filter(ByteSpan decoded, uint32_t stride)
         filter.delta_columns |= static_cast<uint64_t>(best_form[c] & 1) << c;
         filter.plane_columns |= static_cast<uint64_t>(best_form[c] >> 1) << c;
     }
+    const ByteSpan records = decoded.first(n * stride);
+    Bytes columns(records.size());
+    filter_columns(records, stride, filter, columns);
+    const int level = level_for(decoded.size(), kTrialLevel);
+    if (compress_frame(records, level).size() <= compress_frame(columns, level).size())
+        return std::nullopt;
     return filter;
 }
 
@@ -115,21 +133,13 @@ Section make_section(std::string_view id, uint32_t stride, ByteSpan decoded, int
     entry.count = decoded.size() / stride;
     entry.decoded_xxh3 = xxh3(decoded.data(), decoded.size());
     if (level > 0) {
-        SectionEntry filtered = entry;
-        filtered.codec = kCodecZstd;
-        section.stored = compress(decoded, filtered, level);
-        entry = filtered;
-        if (stride % 4 == 0 && stride / 4 <= kMaxFilterColumns) {
-            const ColumnFilter filter = choose_filter(decoded, stride);
-            filtered.filter = kFilterColumns;
-            filtered.delta_columns = filter.delta_columns;
-            filtered.plane_columns = filter.plane_columns;
-            Bytes smaller = compress(decoded, filtered, level);
-            if (smaller.size() < section.stored.size()) {
-                section.stored = std::move(smaller);
-                entry = filtered;
-            }
+        entry.codec = kCodecZstd;
+        if (const std::optional<ColumnFilter> filter = choose_filter(decoded, stride)) {
+            entry.filter = kFilterColumns;
+            entry.delta_columns = filter->delta_columns;
+            entry.plane_columns = filter->plane_columns;
         }
+        section.stored = compress(decoded, entry, level_for(decoded.size(), level));
     }
     if (level <= 0 || section.stored.size() >= decoded.size()) {
         section.stored.assign(decoded.begin(), decoded.end());
@@ -217,9 +227,9 @@ std::vector<Section> make_sections(const PackImage& image, int level)
     return sections;
 }
 
-uint64_t align_up(uint64_t offset)
+uint64_t align_up(uint64_t offset, uint64_t alignment)
 {
-    return (offset + kSectionAlignment - 1) / kSectionAlignment * kSectionAlignment;
+    return (offset + alignment - 1) / alignment * alignment;
 }
 
 } // namespace
@@ -231,7 +241,7 @@ std::vector<std::byte> encode_pack(const PackImage& image, const WriteOptions& o
     uint64_t decoded_bytes = 0;
     std::vector<SectionEntry> table;
     for (Section& section : sections) {
-        section.entry.offset = align_up(end);
+        section.entry.offset = align_up(end, section_alignment(section.entry));
         end = section.entry.offset + section.entry.stored_bytes;
         decoded_bytes += section.entry.decoded_bytes;
         table.push_back(section.entry);

@@ -1,6 +1,7 @@
 #include "preprocess/build_pack.h"
 
 #include "preprocess/bezier_patch.h"
+#include "preprocess/proxy_mesh.h"
 
 #include <algorithm>
 #include <array>
@@ -219,6 +220,16 @@ void append_assembly(const CadModel& model, PackImage& image)
     }
 }
 
+void add_proxy(const CadModel& model, const std::vector<std::vector<uint>>& face_ids, PackImage& image,
+               BuildReport& report)
+{
+    Result<std::vector<std::byte>> encoded = encode_proxy(collect_proxy(model, image, face_ids));
+    if (encoded.ok())
+        image.proxy_draco = std::move(encoded).value();
+    else
+        report.warnings.push_back("no proxy mesh: " + encoded.error().detail);
+}
+
 void run(const CadModel& model, const BuildOptions& options, PackImage& image, BuildReport& report)
 {
     std::vector<ConvertedFace> faces;
@@ -249,6 +260,7 @@ void run(const CadModel& model, const BuildOptions& options, PackImage& image, B
         if (face.dropped_reason.empty())
             convert_surface(face, frames[face.part]);
     });
+    std::vector<std::vector<uint>> face_ids(model.parts.size());
     for (size_t part = 0; part < model.parts.size(); ++part) {
         PartRecord record{};
         record.origin_mm[0] = frames[part].origin_mm.x;
@@ -258,9 +270,12 @@ void run(const CadModel& model, const BuildOptions& options, PackImage& image, B
         record.name = image.strings.add(model.parts[part].name);
         record.first_face = static_cast<uint>(image.faces.size());
         record.first_patch = static_cast<uint>(image.patches.size());
-        for (size_t f = first_of_part[part]; f < first_of_part[part + 1]; ++f)
-            if (faces[f].dropped_reason.empty())
+        for (size_t f = first_of_part[part]; f < first_of_part[part + 1]; ++f) {
+            const bool converted = faces[f].dropped_reason.empty();
+            face_ids[part].push_back(converted ? static_cast<uint>(image.faces.size()) : kNotConverted);
+            if (converted)
                 append_face(faces[f], image);
+        }
         record.face_count = static_cast<uint>(image.faces.size()) - record.first_face;
         record.patch_count = static_cast<uint>(image.patches.size()) - record.first_patch;
         image.parts.push_back(record);
@@ -285,6 +300,10 @@ void run(const CadModel& model, const BuildOptions& options, PackImage& image, B
     report.converted = static_cast<uint32_t>(image.faces.size());
     report.faces = report.converted + static_cast<uint32_t>(image.dropped.size());
     report.warnings = model.warnings;
+
+    start = Clock::now();
+    add_proxy(model, face_ids, image, report);
+    report.proxy_seconds = seconds_since(start);
 }
 
 } // namespace

@@ -146,10 +146,11 @@ Bytes with_extra_section(const char* id, uint16_t codec = kCodecPlain)
     pack.insert(pack.begin() + static_cast<ptrdiff_t>(old_end), moved, std::byte{0});
     for (SectionEntry& e : table)
         e.offset += moved;
-    pack.resize((pack.size() + 63) / 64 * 64);
     SectionEntry extra{};
     std::memcpy(extra.id, id, 4);
     extra.codec = codec;
+    const uint64_t alignment = section_alignment(extra);
+    pack.resize((pack.size() + alignment - 1) / alignment * alignment);
     extra.offset = pack.size();
     extra.stored_bytes = extra.decoded_bytes = extra.count = content.size();
     extra.stride = 1;

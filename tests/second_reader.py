@@ -92,7 +92,8 @@ def read_section(data, at, end):
                       "planes", "stored_xxh3", "decoded_xxh3"), struct.unpack_from("<HHQQQQIIQQQQ", data, at + 4)))
     entry["id"] = data[at:at + 4].decode("ascii")
     offset, size = entry["offset"], entry["stored_size"]
-    need(offset == (end + 63) // 64 * 64 and offset + size <= len(data), entry["id"] + ": place")
+    alignment = 64 if entry["codec"] == 0 else 8
+    need(offset == (end + alignment - 1) // alignment * alignment and offset + size <= len(data), entry["id"] + ": place")
     need(not any(data[end:offset]), entry["id"] + ": padding")
     stored = data[offset:offset + size]
     need(xxh3(stored) == entry["stored_xxh3"], entry["id"] + ": stored checksum")
