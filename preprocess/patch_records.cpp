@@ -161,21 +161,21 @@ Hull hull_of(const BezierPatch& bezier)
     return {0.5 * (lo + hi), 0.5 * norm(hi - lo)};
 }
 
-std::string bad_number(const BezierPatch& bezier)
+/// Done if the patch can be stored: finite numbers, positive weights within a float's range of each other.
+Status check_numbers(const CadSurface& surface, const BezierPatch& bezier)
 {
-    constexpr double kLargestWeightRatio = 1e30; // a float holds 1e-38 ... 1
+    constexpr double kLargestWeightRatio = 1e30;
     double heaviest = 0;
-    for (const auto& p : bezier.control_points)
-        heaviest = std::max(heaviest, p[3]);
     for (const auto& [x, y, z, w] : bezier.control_points) {
         if (!std::isfinite(x) || !std::isfinite(y) || !std::isfinite(z) || !std::isfinite(w))
-            return "a control point is not finite";
-        if (!(w > 0))
-            return fmt::format("weight {} is not positive", w);
-        if (w * kLargestWeightRatio < heaviest)
-            return fmt::format("weights from {} to {} are too far apart", w, heaviest);
+            return invalid(surface, "a control point is not finite");
+        heaviest = std::max(heaviest, w);
     }
-    return {};
+    for (const auto& p : bezier.control_points)
+        if (!(p[3] > 0) || p[3] * kLargestWeightRatio < heaviest)
+            return Error{ErrorCode::UnsupportedSurface, surface.source_kind,
+                         fmt::format("weight {} beside {}: not positive, or too far apart", p[3], heaviest)};
+    return Done{};
 }
 
 void append_bezier(const BezierPatch& bezier, const Rect2d& d, const PartFrame& frame, PatchRecord patch,
@@ -220,8 +220,8 @@ Status append_splines(const CadSurface& s, const Rect2d& d, const PartFrame& fra
     if (beziers.empty())
         return invalid(s, "the domain lies outside the surface");
     for (const BezierPatch& bezier : beziers)
-        if (std::string bad = bad_number(bezier); !bad.empty())
-            return Error{ErrorCode::UnsupportedSurface, s.source_kind, std::move(bad)};
+        if (Status checked = check_numbers(s, bezier); !checked.ok())
+            return checked;
     const size_t before = patches.size();
     for (const BezierPatch& bezier : beziers)
         append_bezier(bezier, d, frame, patch, patches, control_points);

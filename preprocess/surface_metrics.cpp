@@ -65,32 +65,41 @@ SurfaceDerivatives evaluate_turned(const CadFrame& f, double u, double rho, doub
     return {f.origin + rho * radial + h * f.z, rho * tangent, rho_v * radial + h_v * f.z};
 }
 
-/// Sample positions and weights of a direction: 2-point Gauss on equal pieces of each span, few in all.
+/// Sample positions and weights of one direction; the weights sum to the length of the parameter range.
 struct Quadrature {
-    std::vector<double> t, weight; // weights sum to the length of the parameter range
+    std::vector<double> t, weight;
 };
 
-Quadrature quadrature(double lo, double hi, int pieces)
+/// 2-point Gauss on each span, halved where there are few; over many spans, on equal pieces. Areas steer memory: a few
+/// per cent are good enough.
+Quadrature quadrature(const std::vector<double>& knots, int degree, double period, double lo, double hi)
 {
+    constexpr size_t kFewSpans = 6, kManySpans = 12;
+    std::vector<double> ends{lo};
+    const std::vector<SpanCut> cuts = cut_spans(knots, degree, period, lo, hi);
+    if (cuts.size() <= kManySpans) {
+        for (const SpanCut& cut : cuts) {
+            if (degree > 1 && cuts.size() <= kFewSpans)
+                ends.push_back(0.5 * (cut.a + cut.b) + cut.shift);
+            ends.push_back(cut.b + cut.shift);
+        }
+        ends.back() = hi;
+    } else {
+        for (size_t i = 1; i <= kManySpans; ++i)
+            ends.push_back(std::lerp(lo, hi, double(i) / kManySpans));
+    }
+    if (ends.size() == 1)
+        ends.push_back(hi);                       // the domain lies outside the surface: its continuation
     constexpr double kGauss = 0.5773502691896257; // 1 / sqrt 3
     Quadrature q;
-    const double half = (hi - lo) / (2 * pieces);
-    for (int i = 0; i < pieces; ++i) {
-        const double middle = lo + (2 * i + 1) * half;
+    for (size_t i = 0; i + 1 < ends.size(); ++i) {
+        const double middle = 0.5 * (ends[i] + ends[i + 1]), half = 0.5 * (ends[i + 1] - ends[i]);
         for (const double side : {-kGauss, kGauss}) {
             q.t.push_back(middle + side * half);
             q.weight.push_back(half);
         }
     }
     return q;
-}
-
-/// Enough pieces to see each span up to a bound: areas steer memory, a per cent is good enough.
-int piece_count(const std::vector<double>& knots, int degree, double period, double lo, double hi)
-{
-    constexpr int kMostPieces = 8;
-    const int spans = static_cast<int>(cut_spans(knots, degree, period, lo, hi).size());
-    return std::clamp(degree == 1 ? spans : 2 * spans, 1, kMostPieces);
 }
 
 double abs_integral_of_radius(const CadSurface& s, double lo, double hi)
@@ -108,10 +117,8 @@ double abs_integral_of_radius(const CadSurface& s, double lo, double hi)
 SurfaceExtent spline_extent(const CadSurface& surface, const Rect2d& d)
 {
     const SplineSurface& s = surface.spline;
-    const Quadrature qu =
-        quadrature(d.lo.x, d.hi.x, piece_count(s.knots_u, s.degree_u, surface.period_u, d.lo.x, d.hi.x));
-    const Quadrature qv =
-        quadrature(d.lo.y, d.hi.y, piece_count(s.knots_v, s.degree_v, surface.period_v, d.lo.y, d.hi.y));
+    const Quadrature qu = quadrature(s.knots_u, s.degree_u, surface.period_u, d.lo.x, d.hi.x);
+    const Quadrature qv = quadrature(s.knots_v, s.degree_v, surface.period_v, d.lo.y, d.hi.y);
     std::vector<Basis> basis_v;
     for (const double v : qv.t)
         basis_v.push_back(basis_at(s.knots_v, s.degree_v, surface.period_v, v));

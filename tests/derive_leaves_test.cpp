@@ -2,6 +2,7 @@
 #include "format/derive.h"
 #include "format/leaf_geometry.h"
 #include "tests/random_pack.h"
+#include "tests/record_surface.h"
 
 #include <cmath>
 #include <cstring>
@@ -12,51 +13,9 @@
 namespace trimray {
 namespace {
 
+using test::point_of;
 using test::random_pack;
 using test::RandomSurfaces;
-
-/// S(u, v) of a record in patch units, from the single-precision numbers it holds, in double. uv_patch.
-Point3 point_of(const PackImage& image, const PatchRecord& patch, double u, double v)
-{
-    const double r = patch.param[0], cu = std::cos(u), su = std::sin(u);
-    switch (patch.shape & 0xffu) {
-    case kKindPlane:
-        return {u, v, 0};
-    case kKindCylinder:
-        return {r * cu, r * su, v};
-    case kKindCone: {
-        const double a = std::atan(double(patch.param[1])), rho = r + v * std::sin(a);
-        return {rho * cu, rho * su, v * std::cos(a)};
-    }
-    case kKindSphere:
-        return {r * std::cos(v) * cu, r * std::cos(v) * su, r * std::sin(v)};
-    case kKindTorus: {
-        const double rho = r + patch.param[1] * std::cos(v);
-        return {rho * cu, rho * su, patch.param[1] * std::sin(v)};
-    }
-    default:
-        break;
-    }
-    // Bernstein sums
-    const int p = int(patch.shape >> 8 & 0xffu), q = int(patch.shape >> 16 & 0xffu);
-    const bool rational = (patch.shape & kShapeRational) != 0;
-    const auto bernstein = [](int n, double t) {
-        std::vector<double> b(n + 1);
-        for (int i = 0; i <= n; ++i)
-            b[i] = std::exp(std::lgamma(n + 1.0) - std::lgamma(i + 1.0) - std::lgamma(n - i + 1.0)) * std::pow(t, i) *
-                   std::pow(1 - t, n - i);
-        return b;
-    };
-    const std::vector<double> bu = bernstein(p, u), bv = bernstein(q, v);
-    double sum[4] = {0, 0, 0, rational ? 0.0 : 1.0};
-    const int floats = rational ? 4 : 3;
-    for (int i = 0; i <= p; ++i)
-        for (int j = 0; j <= q; ++j)
-            for (int c = 0; c < floats; ++c)
-                sum[c] +=
-                    bu[i] * bv[j] * image.control_points[patch.first_control_point + (i * (q + 1) + j) * floats + c];
-    return {sum[0] / sum[3], sum[1] / sum[3], sum[2] / sum[3]};
-}
 
 struct UvRect {
     double lo[2], hi[2];
@@ -103,7 +62,7 @@ TEST(derive_leaves, a_million_random_points_lie_inside_their_leafs_box)
                 if ((patch.shape & 0xffu) != kKindBezier)
                     at[c] = (at[c] - patch.uv_offset[c]) / patch.uv_scale[c];
             }
-            const double reach = reach_in_box(box, point_of(image, patch, at[0], at[1]));
+            const double reach = reach_in_box(box, point_of(patch, image.control_points.data(), at[0], at[1]));
             outside += reach > 1;
             used = std::max(used, reach);
         }
