@@ -64,8 +64,8 @@ public:
     virtual Result<Frame> render(const RenderOptions& options, RenderStats& stats) = 0;
 };
 
-/// Fails: UnsupportedPackFeature. `instruction_set` is "", "avx512", "avx2" or "sse2"; empty: the best this machine
-/// has.
+/// Fails: UnsupportedPackFeature. `instruction_set` is "", "avx512", "avx2" or "sse4"; empty: the best this machine
+/// has. All give the same bits.
 Result<std::unique_ptr<Tracer>> make_cpu_tracer(std::shared_ptr<const Scene> scene,
                                                 const std::string& instruction_set = "");
 

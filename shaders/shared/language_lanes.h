@@ -109,6 +109,12 @@ FN mask operator==(integer a, integer b)
     TRIMRAY_EACH_PART r.v[i] = hn::RebindMask(RealTag(), hn::Eq(a.v[i], b.v[i]));
     return r;
 }
+FN mask operator<(integer a, integer b)
+{
+    mask r;
+    TRIMRAY_EACH_PART r.v[i] = hn::RebindMask(RealTag(), hn::Lt(a.v[i], b.v[i]));
+    return r;
+}
 FN mask operator!(mask a)
 {
     mask r;
@@ -131,6 +137,14 @@ FN bool any_lane(mask a)
     for (int i = 1; i < kParts; ++i)
         any = hn::Or(any, a.v[i]);
     return !hn::AllFalse(RealTag(), any);
+}
+
+FN scalar largest_lane(real a)
+{
+    hn::Vec<RealTag> largest = a.v[0];
+    for (int i = 1; i < kParts; ++i)
+        largest = hn::Max(largest, a.v[i]);
+    return hn::GetLane(hn::MaxOfLanes(RealTag(), largest));
 }
 
 /// Bit i is lane i.

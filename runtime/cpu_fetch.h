@@ -1,0 +1,54 @@
+// Where the shared formulas' data comes from on the CPU: the pack's arrays. Included once per target.
+#if defined(TRIMRAY_CPU_FETCH_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef TRIMRAY_CPU_FETCH_H
+#undef TRIMRAY_CPU_FETCH_H
+#else
+#define TRIMRAY_CPU_FETCH_H
+#endif
+
+#include "format/pack_image.h"
+#include "shaders/shared/language.h"
+
+SHARED_OPEN
+
+struct FetchSource {
+    const float* control_points;
+    const uint* cells;
+    const uint* cell_entries; // word, eta
+    const float* trim_points;
+    const uint* sdf_words;
+};
+
+static inline FetchSource fetch_source(const PackImage& image)
+{
+    return {image.control_points.data(), image.cells.data(), reinterpret_cast<const uint*>(image.cell_entries.data()),
+            image.trim_points.data(), image.sdf_words.data()};
+}
+
+FN scalar fetch_control(FETCH_PARAM uint index)
+{
+    return source.control_points[index];
+}
+FN integer fetch_cell(FETCH_PARAM integer index)
+{
+    return gather(source.cells, index);
+}
+FN integer fetch_entry_word(FETCH_PARAM integer index)
+{
+    return gather(source.cell_entries, index + index);
+}
+FN real fetch_entry_eta(FETCH_PARAM integer index)
+{
+    return gather(reinterpret_cast<const float*>(source.cell_entries) + 1, index + index);
+}
+FN real2 fetch_trim_point(FETCH_PARAM integer index)
+{
+    return real2(gather(source.trim_points, index + index), gather(source.trim_points + 1, index + index));
+}
+FN integer fetch_sdf_word(FETCH_PARAM integer index)
+{
+    return gather(source.sdf_words, index);
+}
+
+SHARED_CLOSE
+#endif

@@ -1,0 +1,379 @@
+// A packet of 16 rays against the leaves of its tile. Included once per target by cpu_lanes.cpp.
+//
+// A block's candidate leaves come sorted by their nearest point. Each 16 x 16 tile keeps those that its pixels can
+// meet, each packet of 4 x 4 pixels goes through the tile's in order and stops when the next is behind all it has.
+#if defined(TRIMRAY_CPU_PACKET_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef TRIMRAY_CPU_PACKET_H
+#undef TRIMRAY_CPU_PACKET_H
+#else
+#define TRIMRAY_CPU_PACKET_H
+#endif
+
+#include "runtime/cpu_fetch.h"
+#include "runtime/cpu_lanes.h"
+#include "runtime/cpu_write.h"
+#include "shaders/shared/leaf_box.h"
+#include "shaders/shared/patch_newton.h"
+#include "shaders/shared/quadric.h"
+#include "shaders/shared/torus.h"
+#include "shaders/shared/trim_lookup.h"
+
+#include <algorithm>
+#include <limits>
+
+SHARED_OPEN
+
+// uv_face may leave [0,1] by the rounding of an angle (2.5e-7 of 2 pi) and of uv_scale: patches meet without a gap
+constexpr float kDomainSlack = 4e-6f;
+// Newton may end outside of its patch by this much of uv_patch, so that neighbours overlap
+constexpr float kUvOverlap = 1e-5f;
+constexpr int kNewtonSteps = 12;
+constexpr float kNewtonReach = 3.0f; // half sides of the leaf: farther from its middle the start is not this leaf's
+constexpr int kTile = 16;            // pixels
+
+class BlockTracer {
+public:
+    BlockTracer(const BlockJob& job, BlockScratch& scratch, Frame& frame, WorkCounts& work)
+        : job_(job), scratch_(scratch), frame_(frame), work_(work), image_(job.scene.image),
+          source_(fetch_source(job.scene.image))
+    {
+    }
+
+    HWY_ATTR void trace(const Block& block)
+    {
+        const float middle_x = 0.5f * float(job_.width), middle_y = 0.5f * float(job_.height);
+        collect_candidates(job_.scene, job_.view, pixel_rect(block), scratch_.walk, scratch_.candidates, work_);
+        scratch_.has_view.assign(scratch_.candidates.size(), 0);
+        scratch_.patch_views.resize(std::max(scratch_.patch_views.size(), scratch_.candidates.size()));
+        alignas(64) float offset_x[kLanes], offset_y[kLanes];
+        for (int i = 0; i < kLanes; ++i) {
+            offset_x[i] = float(i % 4) + 0.5f - middle_x;
+            offset_y[i] = float(i / 4) + 0.5f - middle_y;
+        }
+        for (uint32_t ty = block.y0; ty < block.y1; ty += kTile) {
+            for (uint32_t tx = block.x0; tx < block.x1; tx += kTile) {
+                const Block tile{tx, ty, std::min(tx + kTile, block.x1), std::min(ty + kTile, block.y1)};
+                choose_candidates(pixel_rect(tile));
+                for (uint32_t y = tile.y0; y < tile.y1; y += 4) {
+                    for (uint32_t x = tile.x0; x < tile.x1; x += 4) {
+                        Packet packet;
+                        packet.x = load(offset_x) + real(float(x));
+                        packet.y = load(offset_y) + real(float(y));
+                        packet.alive = packet.x < float(tile.x1) - middle_x && packet.y < float(tile.y1) - middle_y;
+                        const PacketHit hit = trace_packet(packet, pixel_rect({x, y, x + 4, y + 4}));
+                        write_packet(job_, packet, hit, x, y, tile, frame_, work_);
+                    }
+                }
+            }
+        }
+        work_.rays += uint64_t(block.x1 - block.x0) * (block.y1 - block.y0);
+    }
+
+private:
+    PixelRect pixel_rect(const Block& block) const
+    {
+        const float x = 0.5f * float(job_.width), y = 0.5f * float(job_.height);
+        return {float(block.x0) - x, float(block.x1) - x, float(block.y0) - y, float(block.y1) - y};
+    }
+
+    /// Copies the candidates that meet the tile into the scratch's arrays.
+    void choose_candidates(const PixelRect& rect)
+    {
+        const std::vector<Candidate>& all = scratch_.candidates;
+        BlockScratch& s = scratch_;
+        if (s.x0.size() < all.size() + kLanes)
+            for (std::vector<float>* v : {&s.x0, &s.x1, &s.y0, &s.y1, &s.near_mm})
+                v->resize(all.size() + kLanes);
+        s.index.resize(std::max(s.index.size(), all.size() + kLanes));
+        tile_count_ = 0;
+        for (size_t i = 0; i < all.size(); ++i) {
+            const Candidate& c = all[i];
+            s.x0[tile_count_] = c.rect.x0;
+            s.x1[tile_count_] = c.rect.x1;
+            s.y0[tile_count_] = c.rect.y0;
+            s.y1[tile_count_] = c.rect.y1;
+            s.near_mm[tile_count_] = c.near_mm;
+            s.index[tile_count_] = uint32_t(i);
+            tile_count_ += c.rect.x0 <= rect.x1 && c.rect.x1 >= rect.x0 && c.rect.y0 <= rect.y1 && c.rect.y1 >= rect.y0;
+        }
+        for (size_t i = tile_count_; i < tile_count_ + kLanes; ++i) {
+            s.x0[i] = std::numeric_limits<float>::infinity(); // meets no packet
+            s.x1[i] = s.y0[i] = s.y1[i] = s.near_mm[i] = 0;
+        }
+    }
+
+    HWY_ATTR PacketHit trace_packet(const Packet& packet, const PixelRect& rect)
+    {
+        PacketHit hit;
+        hit.best = select(packet.alive, real(kHuge), real(-kHuge));
+        hit.leaf = integer(~0u);
+        hit.instance = integer(~0u);
+        hit.uv_face = real2(real(0.0f), real(0.0f));
+        hit.normal = real3(real(0.0f), real(0.0f), real(1.0f));
+        hit.doubt = mask(false);
+        float farthest = kHuge;
+        recent_count_ = 0;
+        for (size_t first = 0; first < tile_count_; first += kLanes) {
+            if (scratch_.near_mm[first] > farthest)
+                break;
+            const mask meets = load(&scratch_.x0[first]) <= rect.x1 && load(&scratch_.x1[first]) >= rect.x0 &&
+                               load(&scratch_.y0[first]) <= rect.y1 && load(&scratch_.y1[first]) >= rect.y0;
+            for (uint bits = lane_bits(meets); bits != 0; bits &= bits - 1) {
+                const size_t i = first + size_t(__builtin_ctz(bits));
+                if (scratch_.near_mm[i] > farthest)
+                    break;
+                if (intersect(packet, scratch_.index[i], hit))
+                    farthest = largest_lane(hit.best);
+            }
+        }
+        return hit;
+    }
+
+    /// Tests one candidate; true if a ray's nearest hit changed.
+    HWY_ATTR bool intersect(const Packet& packet, uint32_t candidate_index, PacketHit& hit)
+    {
+        const Candidate& candidate = scratch_.candidates[candidate_index];
+        const uint patch_id = image_.leaves[candidate.leaf].patch;
+        const PatchRecord& patch = image_.patches[patch_id];
+        if (job_.scene.shared_patch[patch_id] && was_tested(candidate.instance, patch_id))
+            return false;
+        ++work_.leaf_visits;
+        if (!scratch_.has_view[candidate_index]) {
+            scratch_.patch_views[candidate_index] =
+                make_patch_view(patch, job_.view.instances[candidate.instance], job_.view.tau_ref);
+            scratch_.has_view[candidate_index] = 1;
+        }
+        const PatchView& view = scratch_.patch_views[candidate_index];
+        const real3 across = packet.x * scalar3(view.step_x[0], view.step_x[1], view.step_x[2]) +
+                             packet.y * scalar3(view.step_y[0], view.step_y[1], view.step_y[2]);
+        const scalar3 middle(view.origin[0], view.origin[1], view.origin[2]);
+        const scalar3 w0(view.w0[0], view.w0[1], view.w0[2]);
+        const real3 origin = middle + across * real(view.tau);
+        const real3 direction = w0 + across;
+        Target target{candidate, view, patch, image_.faces[patch.face], false};
+        const scalar r = patch.param[0], second = patch.param[1];
+        switch (patch.shape & 0xffu) {
+        case kKindPlane: {
+            const real t = plane_roots(origin, direction).t0;
+            const mask near = in_range(target, t, hit);
+            if (any_lane(near))
+                offer(target, near, t, plane_uv(origin + direction * t), plane_normal(), hit);
+            break;
+        }
+        case kKindCylinder:
+            offer_pair(
+                target, cylinder_roots(r, origin, direction), origin, direction,
+                [](real3 p) HWY_ATTR { return cylinder_uv(p); }, [](real3 p) HWY_ATTR { return cylinder_normal(p); },
+                hit);
+            break;
+        case kKindCone:
+            offer_pair(
+                target, cone_roots(r, second, origin, direction), origin, direction,
+                [=](real3 p) HWY_ATTR { return cone_uv(r, second, p); },
+                [=](real3 p) HWY_ATTR { return cone_normal(r, second, p); }, hit);
+            break;
+        case kKindSphere:
+            offer_pair(
+                target, sphere_roots(r, origin, direction), origin, direction,
+                [](real3 p) HWY_ATTR { return sphere_uv(p); }, [](real3 p) HWY_ATTR { return sphere_normal(p); }, hit);
+            break;
+        case kKindTorus:
+            intersect_torus(target, origin, direction, hit);
+            break;
+        default:
+            intersect_bezier(packet, target, origin, direction, hit);
+            break;
+        }
+        return target.changed;
+    }
+
+    struct Target {
+        const Candidate& candidate;
+        const PatchView& view;
+        const PatchRecord& patch;
+        const FaceRecord& face;
+        bool changed;
+    };
+
+    /// In front of the eye and not behind the nearest hit.
+    HWY_ATTR mask in_range(const Target& target, real t, const PacketHit& hit) const
+    {
+        const real at = target.view.base_mm + target.view.mm_per_t * t;
+        return at > -float(job_.view.tau_ref) && at < hit.best + target.view.slack_mm && t < kHuge;
+    }
+
+    template <class Uv, class Normal>
+    HWY_ATTR HWY_INLINE void offer_pair(Target& target, RootPair roots, real3 origin, real3 direction, Uv uv,
+                                        Normal normal, PacketHit& hit)
+    {
+        for (const real& t : {roots.t0, roots.t1}) {
+            const mask near = in_range(target, t, hit);
+            if (!any_lane(near))
+                continue;
+            const real3 p = origin + direction * select(near, t, real(0.0f));
+            offer(target, near, t, uv(p), normal(p), hit);
+        }
+    }
+
+    HWY_ATTR HWY_NOINLINE void intersect_torus(Target& target, real3 origin, real3 direction, PacketHit& hit)
+    {
+        const scalar R = target.patch.param[0], r = target.patch.param[1];
+        const TorusRoots roots = torus_roots(R, r, origin, direction);
+        for (const real& t : {roots.t0, roots.t1, roots.t2, roots.t3}) {
+            const mask near = in_range(target, t, hit);
+            if (!any_lane(near))
+                continue;
+            const real3 p = origin + direction * select(near, t, real(0.0f));
+            offer(target, near, t, torus_uv(R, r, p), torus_normal(R, r, p), hit);
+        }
+    }
+
+    /// Newton from the leaf's middle in all lanes that meet its box.
+    HWY_ATTR HWY_NOINLINE void intersect_bezier(const Packet& packet, Target& target, real3 origin, real3 direction,
+                                                PacketHit& hit)
+    {
+        constexpr float kBoxMargin = 1e-6f; // patch units: the ray's rounding
+        const LeafBox box = decode_leaf(image_.leaves[target.candidate.leaf]);
+        const BoxHit in_box = leaf_box_hit(box, origin, direction, kBoxMargin);
+        const float base = target.view.base_mm, per_t = target.view.mm_per_t;
+        mask moving = in_box.hit && packet.alive && base + per_t * in_box.near < hit.best + target.view.slack_mm &&
+                      base + per_t * in_box.far > -float(job_.view.tau_ref);
+        if (!any_lane(moving))
+            return;
+        const PatchRecord& patch = target.patch;
+        const int degree_u = int(patch.shape >> 8 & 0xffu), degree_v = int(patch.shape >> 16 & 0xffu);
+        const bool rational = (patch.shape & kShapeRational) != 0;
+        const scalar middle_u = 0.5f * (box.uv_lo.x + box.uv_hi.x), middle_v = 0.5f * (box.uv_lo.y + box.uv_hi.y);
+        const scalar reach_u = kNewtonReach * (middle_u - box.uv_lo.x),
+                     reach_v = kNewtonReach * (middle_v - box.uv_lo.y);
+        const RayPlanes planes = ray_planes(origin, direction);
+        // a step from this far ends within its square, times the leaf's curvature: 6e-8 is below rounding
+        const scalar enough = min(max(job_.error_px * target.view.pixel, 1e-6f), 2.4e-4f);
+        real2 uv = scalar2(middle_u, middle_v);
+        mask settled = mask(false);
+        for (int step = 0; step < kNewtonSteps && any_lane(moving); ++step) {
+            const SurfacePoint s = evaluate(patch.first_control_point, degree_u, degree_v, rational, uv);
+            const NewtonStep next = newton_step(s, planes, uv);
+            ++work_.newton_steps;
+            const mask done = next.residual <= enough || next.singular;
+            real2 to = real2(clamp(next.uv.x, real(middle_u - reach_u), real(middle_u + reach_u)),
+                             clamp(next.uv.y, real(middle_v - reach_v), real(middle_v + reach_v)));
+            uv = select(moving, to, uv);
+            settled = settled || (moving && done);
+            moving = moving && !done;
+        }
+        hit.doubt = hit.doubt || moving;
+        const mask inside = settled && abs(uv.x - 0.5f) <= 0.5f + kUvOverlap && abs(uv.y - 0.5f) <= 0.5f + kUvOverlap;
+        if (!any_lane(inside))
+            return;
+        SurfacePoint s = evaluate(patch.first_control_point, degree_u, degree_v, rational, uv);
+        const real r1 = dot(planes.n1, s.p) + planes.d1, r2 = dot(planes.n2, s.p) + planes.d2;
+        const real residual = sqrt(r1 * r1 + r2 * r2);
+        const real t = dot(s.p - origin, direction) / dot(direction, direction);
+        const mask near = inside && residual <= max(enough, 4e-6f) && in_range(target, t, hit);
+        if (!any_lane(near))
+            return;
+        real3 normal = cross(s.du, s.dv);
+        const mask flat = dot(normal, normal) <= 1e-10f * dot(s.du, s.du) * dot(s.dv, s.dv) ||
+                          dot(s.du, s.du) <= 1e-10f * dot(s.dv, s.dv) || dot(s.dv, s.dv) <= 1e-10f * dot(s.du, s.du);
+        if (any_lane(near && flat)) {
+            // a pole or a degenerate side: the normal a little way inside
+            constexpr float kInwards = 1.0f / 2048;
+            const real2 inner = uv + real2(0.5f - uv.x, 0.5f - uv.y) * real(kInwards);
+            s = evaluate(patch.first_control_point, degree_u, degree_v, rational, inner);
+            normal = select(flat, cross(s.du, s.dv), normal);
+        }
+        offer(target, near, t, uv, normal, hit);
+    }
+
+    HWY_ATTR HWY_NOINLINE SurfacePoint evaluate(uint first, int degree_u, int degree_v, bool rational, real2 uv) const
+    {
+        const FetchSource& source = source_;
+        return bezier_point(FETCH_PASS first, degree_u, degree_v, rational, uv);
+    }
+
+    /// Takes the roots that lie in the face's domain and inside its trims.
+    HWY_ATTR HWY_INLINE void offer(Target& target, mask near, real t, real2 uv_patch, real3 normal, PacketHit& hit)
+    {
+        const PatchRecord& patch = target.patch;
+        real2 uv(patch.uv_offset[0] + patch.uv_scale[0] * uv_patch.x,
+                 patch.uv_offset[1] + patch.uv_scale[1] * uv_patch.y);
+        if ((patch.shape & 0xffu) == kKindTorus) {
+            // pack_layout.h: the torus' v is unwrapped upwards
+            const float half_turn = kPi * patch.uv_scale[1];
+            uv.y = select(uv.y < 0.5f - half_turn, uv.y + 2.0f * half_turn, uv.y);
+        }
+        mask taken = near && abs(uv.x - 0.5f) <= 0.5f + kDomainSlack && abs(uv.y - 0.5f) <= 0.5f + kDomainSlack;
+        if (!any_lane(taken))
+            return;
+        uv = real2(clamp(uv.x, real(0.0f), real(1.0f)), clamp(uv.y, real(0.0f), real(1.0f)));
+        // of two hits within rounding the one of the lower instance and leaf stays, whatever the order
+        const real at = target.view.base_mm + target.view.mm_per_t * t;
+        const integer leaf(target.candidate.leaf), instance(target.candidate.instance);
+        const mask first = instance < hit.instance || (instance == hit.instance && leaf < hit.leaf);
+        taken = taken && at < hit.best + select(first, real(target.view.slack_mm), real(-target.view.slack_mm));
+        if (!any_lane(taken))
+            return;
+        if ((target.face.flags & kFaceNaturalBorder) == 0) {
+            taken = taken && inside_trims(target.face, uv, taken);
+            if (!any_lane(taken))
+                return;
+        }
+        hit.best = select(taken, at, hit.best);
+        hit.leaf = select(taken, leaf, hit.leaf);
+        hit.instance = select(taken, instance, hit.instance);
+        hit.uv_face = select(taken, uv, hit.uv_face);
+        hit.normal = select(taken, normal, hit.normal);
+        target.changed = true;
+    }
+
+    HWY_ATTR mask inside_trims(const FaceRecord& face, real2 uv, mask asked)
+    {
+        const FetchSource& source = source_;
+        const TrimFace trim = trim_face(face);
+        // lanes that do not ask look up a point that exists
+        const real2 q(select(asked, uv.x, real(0.0f)), select(asked, uv.y, real(0.0f)));
+        if (job_.use_sdf && face.sdf_size != 0)
+            return sdf_distance(FETCH_PASS trim, q) > 0.0f;
+        if (face.grid == 0)
+            return mask(false); // a face without cells has no inside
+        const integer word = cell_word(FETCH_PASS trim, q);
+        mask inside = cell_says_inside(word);
+        mask open = asked && cell_is_mixed(word);
+        integer at = cell_first_entry(trim, word);
+        while (any_lane(open)) {
+            at = select(open, at, integer(face.first_entry));
+            const integer entry = fetch_entry_word(FETCH_PASS at);
+            const mask crossed = entry_crossed(FETCH_PASS trim, entry, fetch_entry_eta(FETCH_PASS at), q);
+            ++work_.curve_tests;
+            inside = differ(inside, open && crossed);
+            open = open && !entry_is_last(entry);
+            at = at + integer(1u);
+        }
+        return inside;
+    }
+
+    bool was_tested(uint instance, uint patch)
+    {
+        constexpr uint kRecent = 8;
+        const uint64_t key = uint64_t(instance) << 32 | patch;
+        for (uint i = 0; i < std::min(recent_count_, kRecent); ++i)
+            if (recent_[i] == key)
+                return true;
+        recent_[recent_count_++ % kRecent] = key;
+        return false;
+    }
+
+    const BlockJob& job_;
+    BlockScratch& scratch_;
+    Frame& frame_;
+    WorkCounts& work_;
+    const PackImage& image_;
+    const FetchSource source_;
+    size_t tile_count_ = 0;
+    uint64_t recent_[8];
+    uint recent_count_ = 0;
+};
+
+SHARED_CLOSE
+#endif

@@ -1,0 +1,161 @@
+#include "runtime/cpu_lanes.h"
+#include "runtime/tracer.h"
+
+#include <algorithm>
+#include <chrono>
+#include <limits>
+#include <utility>
+
+#include <fmt/format.h>
+#include <tbb/blocked_range2d.h>
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/info.h>
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+namespace trimray {
+namespace {
+
+constexpr uint32_t kBlock = 64; // pixels: candidates are collected once for so many
+
+void resize(Frame& frame, uint32_t width, uint32_t height)
+{
+    const size_t pixels = size_t(width) * height;
+    frame.width = width;
+    frame.height = height;
+    frame.rgba.resize(4 * pixels);
+    frame.depth_mm.resize(pixels);
+    frame.normal.resize(3 * pixels);
+    frame.uv.resize(2 * pixels);
+    frame.face.resize(pixels);
+    frame.instance.resize(pixels);
+    frame.certified.resize(pixels);
+}
+
+void add(WorkCounts& sum, const WorkCounts& part)
+{
+    sum.rays += part.rays;
+    sum.node_visits += part.node_visits;
+    sum.leaf_visits += part.leaf_visits;
+    sum.newton_steps += part.newton_steps;
+    sum.curve_tests += part.curve_tests;
+    sum.uncertified_pixels += part.uncertified_pixels;
+}
+
+class CpuTracer final : public Tracer {
+public:
+    CpuTracer(std::shared_ptr<const Scene> scene, TraceBlock trace_block, const std::string& instruction_set)
+        : scene_(std::move(scene)), cpu_scene_(scene_->pack.image), trace_block_(trace_block),
+          name_(fmt::format("CPU, {}", instruction_set))
+    {
+    }
+
+    std::string device_name() const override { return name_; }
+
+    Result<Frame> render(const RenderOptions& options, RenderStats& stats) override
+    {
+        constexpr uint32_t kLargestSide = 65536; // pixels; and a picture of 2^30 in all
+        if (options.width == 0 || options.height == 0 || options.width > kLargestSide ||
+            options.height > kLargestSide || uint64_t(options.width) * options.height > 1u << 30)
+            return Error{ErrorCode::Usage, "size",
+                         fmt::format("{}x{} is not between 1x1 and {}x{} with at most 2^30 pixels", options.width,
+                                     options.height, kLargestSide, kLargestSide)};
+        if (options.trim == TrimMode::Hybrid || options.trim == TrimMode::Kd)
+            return Error{ErrorCode::UnsupportedPackFeature, "trim",
+                         "the CPU tracer answers trims in the modes exact and sdf; choose one of them, or auto"};
+        stats.device = name_;
+        stats.trim = options.trim == TrimMode::Sdf ? TrimMode::Sdf : TrimMode::Exact;
+        stats.frame_ms.clear();
+        Frame frame;
+        resize(frame, options.width, options.height);
+        const int threads =
+            options.threads > 0 ? int(std::min(options.threads, 1024u)) : tbb::info::default_concurrency();
+        tbb::task_arena arena(threads);
+        for (uint32_t i = 0; i < std::max(options.frames, 1u); ++i) {
+            const auto start = std::chrono::steady_clock::now();
+            stats.work = render_once(options, stats.trim, threads, arena, frame);
+            const std::chrono::duration<double, std::milli> spent = std::chrono::steady_clock::now() - start;
+            stats.frame_ms.push_back(spent.count());
+        }
+        return frame;
+    }
+
+private:
+    WorkCounts render_once(const RenderOptions& options, TrimMode trim, int threads, tbb::task_arena& arena,
+                           Frame& frame)
+    {
+        const View view = make_view(cpu_scene_.image, camera_rays(options.camera, options.width, options.height),
+                                    options.width, options.height);
+        const BlockJob job{cpu_scene_,      view, options.width, options.height, trim == TrimMode::Sdf, options.shade,
+                           options.error_px};
+        const uint32_t columns = (options.width + kBlock - 1) / kBlock, rows = (options.height + kBlock - 1) / kBlock;
+        tbb::enumerable_thread_specific<WorkCounts> counts;
+        const auto trace_one = [&](uint32_t i) {
+            const uint32_t x = i % columns * kBlock, y = i / columns * kBlock;
+            const Block block{x, y, std::min(x + kBlock, options.width), std::min(y + kBlock, options.height)};
+            trace_block_(job, block, scratch_.local(), frame, counts.local());
+        };
+        if (threads == 1) {
+            for (uint32_t i = 0; i < columns * rows; ++i)
+                trace_one(i);
+        } else {
+            arena.execute([&] { tbb::parallel_for(0u, columns * rows, trace_one); });
+        }
+        WorkCounts sum;
+        for (const WorkCounts& some : counts)
+            add(sum, some);
+        return sum;
+    }
+
+    std::shared_ptr<const Scene> scene_;
+    CpuScene cpu_scene_;
+    TraceBlock trace_block_;
+    std::string name_;
+    tbb::enumerable_thread_specific<BlockScratch> scratch_;
+};
+
+} // namespace
+
+Result<std::unique_ptr<Tracer>> make_cpu_tracer(std::shared_ptr<const Scene> scene, const std::string& instruction_set)
+{
+    std::string found;
+    const TraceBlock trace_block = find_trace_block(instruction_set, found);
+    if (!trace_block)
+        return Error{ErrorCode::UnsupportedPackFeature, "instruction set",
+                     instruction_set.empty()
+                         ? std::string("this processor has none of avx512, avx2 and sse4")
+                         : fmt::format("{}: this processor does not have it, or the name is none of "
+                                       "avx512, avx2 and sse4",
+                                       instruction_set)};
+    return std::unique_ptr<Tracer>(std::make_unique<CpuTracer>(std::move(scene), trace_block, found));
+}
+
+RayHit trace_ray(const Scene& scene, const std::array<double, 3>& origin_mm, const std::array<double, 3>& direction)
+{
+    RayHit result;
+    std::string found;
+    const TraceBlock trace_block = find_trace_block("", found);
+    const bool has_direction = direction[0] != 0 || direction[1] != 0 || direction[2] != 0;
+    if (!trace_block || !has_direction)
+        return result;
+    const CpuScene cpu_scene(scene.pack.image);
+    const View view = make_single_ray_view(scene.pack.image, origin_mm, direction);
+    const BlockJob job{cpu_scene, view, 1, 1, false, false, 0.02f};
+    Frame frame;
+    resize(frame, 1, 1);
+    BlockScratch scratch;
+    WorkCounts work;
+    trace_block(job, {0, 0, 1, 1}, scratch, frame, work);
+    if (frame.face[0] < 0)
+        return result;
+    result.hit = true;
+    result.distance_mm = frame.depth_mm[0];
+    for (size_t i = 0; i < 3; ++i)
+        result.normal[i] = frame.normal[i];
+    result.uv = {frame.uv[0], frame.uv[1]};
+    result.face = frame.face[0];
+    result.instance = frame.instance[0];
+    return result;
+}
+
+} // namespace trimray

@@ -1,0 +1,370 @@
+#include "runtime/cpu_view.h"
+
+#include "format/leaf_geometry.h"
+#include "runtime/image_io.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace trimray {
+namespace {
+
+constexpr uint kDefaultColor = 0xffb4b0acu; // as in shaders/shared/shading.h
+
+std::array<float, 3> linear_color(uint rgba)
+{
+    return {srgb_to_linear(float(rgba & 0xffu) / 255), srgb_to_linear(float(rgba >> 8 & 0xffu) / 255),
+            srgb_to_linear(float(rgba >> 16 & 0xffu) / 255)};
+}
+
+void cross(const double a[3], const double b[3], double out[3])
+{
+    out[0] = a[1] * b[2] - a[2] * b[1];
+    out[1] = a[2] * b[0] - a[0] * b[2];
+    out[2] = a[0] * b[1] - a[1] * b[0];
+}
+double dot(const double a[3], const double b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+/// Rows of the inverse of the matrix with columns a, b, c.
+void invert_columns(const double a[3], const double b[3], const double c[3], double rows[3][3])
+{
+    cross(b, c, rows[0]);
+    cross(c, a, rows[1]);
+    cross(a, b, rows[2]);
+    const double det = dot(a, rows[0]);
+    for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j)
+            rows[i][j] /= det;
+}
+
+InstanceView view_from(const InstanceRecord& instance, const PartRecord& part, const View& view)
+{
+    // p_world = M (origin + scale p) + m
+    double columns[3][3], translation[3];
+    for (int row = 0; row < 3; ++row) {
+        const double* m = instance.transform + 4 * row;
+        for (int c = 0; c < 3; ++c)
+            columns[c][row] = m[c] * part.scale_mm;
+        translation[row] = m[0] * part.origin_mm[0] + m[1] * part.origin_mm[1] + m[2] * part.origin_mm[2] + m[3];
+    }
+    double inverse[3][3];
+    invert_columns(columns[0], columns[1], columns[2], inverse);
+    const double offset[3] = {view.eye_mm[0] - translation[0], view.eye_mm[1] - translation[1],
+                              view.eye_mm[2] - translation[2]};
+    InstanceView out;
+    double w0[3];
+    for (int i = 0; i < 3; ++i) {
+        out.eye[i] = dot(inverse[i], offset);
+        w0[i] = dot(inverse[i], view.w0);
+    }
+    out.k = std::sqrt(dot(w0, w0));
+    for (int i = 0; i < 3; ++i) {
+        out.w0[i] = w0[i] / out.k;
+        out.step_x[i] = dot(inverse[i], view.step_x) / out.k;
+        out.step_y[i] = dot(inverse[i], view.step_y) / out.k;
+    }
+    double rows[3][3];
+    invert_columns(out.w0, out.step_x, out.step_y, rows);
+    for (int i = 0; i < 3; ++i) {
+        out.row_tau[i] = rows[0][i];
+        out.row_x[i] = rows[1][i];
+        out.row_y[i] = rows[2][i];
+        // n_world = M^-T n: world component i = sum_j inverse[j][i] n_j
+        for (int j = 0; j < 3; ++j)
+            out.normal[i][j] = float(inverse[j][i] * part.scale_mm);
+    }
+    return out;
+}
+
+/// Fills what follows from eye, w0 and steps.
+void finish_view(const PackImage& image, View& view)
+{
+    // tau of the model's nearest corner, or of the eye where that is behind it
+    double nearest = std::numeric_limits<double>::infinity();
+    for (int corner = 0; corner < 8; ++corner) {
+        double p[3];
+        for (int i = 0; i < 3; ++i)
+            p[i] = (corner >> i & 1 ? image.bounds_hi_mm[i] : image.bounds_lo_mm[i]) - view.eye_mm[i];
+        nearest = std::min(nearest, dot(p, view.w0));
+    }
+    view.tau_ref = nearest > 0 && nearest < 1e30 ? double(float(nearest)) : 0;
+    view.instances.reserve(image.instances.size());
+    for (const InstanceRecord& instance : image.instances)
+        view.instances.push_back(view_from(instance, image.parts[instance.part], view));
+}
+
+/// A point set center + sum of +-half_axis[i], seen: the centre's and the axes' (tau, tau x, tau y).
+struct SeenBox {
+    double center[3], axis[3][3];
+};
+
+/// A frustum of a rectangle in one instance's part: points p with f . (p - eye) >= 0 for all f.
+struct Frustum {
+    double eye[3];
+    double plane[5][3], reach[5][3]; // tau > 0 and the rectangle's four sides; |plane|
+
+    Frustum(const InstanceView& view, const PixelRect& rect)
+    {
+        for (int i = 0; i < 3; ++i) {
+            eye[i] = view.eye[i];
+            plane[0][i] = view.row_tau[i];
+            plane[1][i] = view.row_x[i] - rect.x0 * view.row_tau[i];
+            plane[2][i] = rect.x1 * view.row_tau[i] - view.row_x[i];
+            plane[3][i] = view.row_y[i] - rect.y0 * view.row_tau[i];
+            plane[4][i] = rect.y1 * view.row_tau[i] - view.row_y[i];
+        }
+        for (int f = 0; f < 5; ++f)
+            for (int i = 0; i < 3; ++i)
+                reach[f][i] = std::abs(plane[f][i]);
+    }
+
+    bool meets(const double center[3], const double half[3]) const
+    {
+        for (int f = 0; f < 5; ++f) {
+            const double most = dot(plane[f], center) + dot(reach[f], half);
+            if (!(most >= 0))
+                return false;
+        }
+        return true;
+    }
+};
+
+/// Calls leaf(index) for each leaf of the tree whose box meets the frustum.
+template <class Leaf>
+void walk(const BvhNode* nodes, const Frustum& frustum, std::vector<uint32_t>& stack, WorkCounts& work, Leaf leaf)
+{
+    const size_t bottom = stack.size();
+    stack.push_back(0);
+    while (stack.size() > bottom) {
+        const BvhNode& node = nodes[stack.back()];
+        stack.pop_back();
+        ++work.node_visits;
+        double step[3], origin[3];
+        for (int c = 0; c < 3; ++c) {
+            step[c] = std::ldexp(0.5, int(node.exponents >> 8 * c & 0xffu) - 127); // half a step: centre and half side
+            origin[c] = double(node.origin[c]) - frustum.eye[c];
+        }
+        for (int i = 0; i < 4; ++i) {
+            if (node.child[i] == kBvhEmpty)
+                continue;
+            double center[3], half[3];
+            for (int c = 0; c < 3; ++c) {
+                const int lo = int(node.lo[c] >> 8 * i & 0xffu), hi = int(node.hi[c] >> 8 * i & 0xffu);
+                center[c] = origin[c] + step[c] * (lo + hi);
+                half[c] = step[c] * (hi - lo);
+            }
+            if (!frustum.meets(center, half))
+                continue;
+            if ((node.child[i] & kBvhLeaf) != 0)
+                leaf(node.child[i] & ~kBvhLeaf);
+            else
+                stack.push_back(node.child[i]);
+        }
+    }
+}
+
+/// Where a leaf's box appears on the picture; false: not within the rectangle.
+bool project_box(const CpuScene::LeafBounds& box, const InstanceView& view, const PixelRect& rect, double tau_ref,
+                 Candidate& out)
+{
+    const double c[3] = {box.center[0] - view.eye[0], box.center[1] - view.eye[1], box.center[2] - view.eye[2]};
+    const double tau = dot(view.row_tau, c), x = dot(view.row_x, c), y = dot(view.row_y, c);
+    double tau_a[3], x_a[3], y_a[3], reach = 0;
+    for (int i = 0; i < 3; ++i) {
+        const double a[3] = {box.half_axis[i][0], box.half_axis[i][1], box.half_axis[i][2]};
+        tau_a[i] = dot(view.row_tau, a);
+        x_a[i] = dot(view.row_x, a);
+        y_a[i] = dot(view.row_y, a);
+        reach += std::abs(tau_a[i]);
+    }
+    // the centre is rounded to 2^-24 of the part
+    reach = reach * (1 + 1e-7) + 1e-7;
+    if (tau + reach <= 0)
+        return false;
+    out.near_mm = float((std::max(tau - reach, 0.0) / view.k - tau_ref) - 1e-7 * (tau / view.k));
+    out.rect = rect;
+    // a box around the eye's plane may be anywhere; one well before it is the hull of its corners
+    if (!(tau - reach > 1e-3 * reach))
+        return true;
+    double x0 = 1e30, x1 = -1e30, y0 = 1e30, y1 = -1e30;
+    for (int corner = 0; corner < 8; ++corner) {
+        const double a = corner & 1 ? 1 : -1, b = corner & 2 ? 1 : -1, d = corner & 4 ? 1 : -1;
+        const double per_tau = 1 / (tau + a * tau_a[0] + b * tau_a[1] + d * tau_a[2]);
+        const double px = (x + a * x_a[0] + b * x_a[1] + d * x_a[2]) * per_tau;
+        const double py = (y + a * y_a[0] + b * y_a[1] + d * y_a[2]) * per_tau;
+        x0 = std::min(x0, px);
+        x1 = std::max(x1, px);
+        y0 = std::min(y0, py);
+        y1 = std::max(y1, py);
+    }
+    constexpr double kPad = 0.01; // pixels: rounding of the rectangle to float, and of the box's centre
+    const double pad = kPad + 1e-6 * (x1 - x0 + y1 - y0);
+    out.rect = {float(x0 - pad), float(x1 + pad), float(y0 - pad), float(y1 + pad)};
+    return out.rect.x0 <= rect.x1 && out.rect.x1 >= rect.x0 && out.rect.y0 <= rect.y1 && out.rect.y1 >= rect.y0;
+}
+
+} // namespace
+
+CpuScene::CpuScene(const PackImage& pack) : image(pack)
+{
+    left_handed.resize(pack.patches.size());
+    shared_patch.resize(pack.patches.size());
+    for (size_t p = 0; p < pack.patches.size(); ++p) {
+        const PatchRecord& patch = pack.patches[p];
+        const double x[3] = {patch.axis_x[0], patch.axis_x[1], patch.axis_x[2]};
+        const double y[3] = {patch.axis_y[0], patch.axis_y[1], patch.axis_y[2]};
+        const double z[3] = {patch.axis_z[0], patch.axis_z[1], patch.axis_z[2]};
+        double across[3];
+        cross(x, y, across);
+        left_handed[p] = dot(across, z) < 0;
+    }
+    std::vector<uint8_t> seen(pack.patches.size());
+    leaf_bounds.resize(pack.leaves.size());
+    for (size_t i = 0; i < pack.leaves.size(); ++i) {
+        const LeafRecord& leaf = pack.leaves[i];
+        const PatchRecord& patch = pack.patches[leaf.patch];
+        const OrientedBox box = decode_leaf_box(leaf);
+        const auto to_part = [&](const Point3& q, int c) {
+            return patch.scale * (patch.axis_x[c] * q[0] + patch.axis_y[c] * q[1] + patch.axis_z[c] * q[2]);
+        };
+        for (int c = 0; c < 3; ++c) {
+            const double origin = double(patch.origin_hi[c]) + double(patch.origin_lo[c]);
+            leaf_bounds[i].center[c] = float(origin + to_part(box.center, c));
+            for (int a = 0; a < 3; ++a)
+                leaf_bounds[i].half_axis[a][c] = float(box.half[a] * to_part(box.axis[a], c));
+        }
+        if (seen[leaf.patch] && (patch.shape & 0xffu) != kKindBezier)
+            shared_patch[leaf.patch] = 1;
+        seen[leaf.patch] = 1;
+    }
+    for (const FaceRecord& face : pack.faces)
+        face_color.push_back(linear_color(face.color_rgba));
+    for (const InstanceRecord& instance : pack.instances)
+        instance_color.push_back(linear_color(instance.color_rgba >> 24 != 0 ? instance.color_rgba : kDefaultColor));
+}
+
+size_t CpuScene::bytes() const
+{
+    return leaf_bounds.size() * sizeof(LeafBounds) +
+           (face_color.size() + instance_color.size()) * sizeof(face_color[0]) + left_handed.size() +
+           shared_patch.size();
+}
+
+View make_view(const PackImage& image, const CameraRays& rays, uint32_t width, uint32_t height)
+{
+    View view;
+    double w0[3];
+    for (size_t i = 0; i < 3; ++i) {
+        view.eye_mm[i] = rays.eye[i];
+        w0[i] = rays.corner[i] + 0.5 * width * rays.step_x[i] + 0.5 * height * rays.step_y[i];
+    }
+    const double length = std::sqrt(dot(w0, w0));
+    for (size_t i = 0; i < 3; ++i) {
+        view.w0[i] = w0[i] / length;
+        view.step_x[i] = rays.step_x[i] / length;
+        view.step_y[i] = rays.step_y[i] / length;
+    }
+    finish_view(image, view);
+    return view;
+}
+
+View make_single_ray_view(const PackImage& image, const std::array<double, 3>& origin_mm,
+                          const std::array<double, 3>& direction)
+{
+    constexpr double kPixel = 1e-4;
+    View view;
+    double d[3] = {direction[0], direction[1], direction[2]};
+    const double largest = std::max({std::abs(d[0]), std::abs(d[1]), std::abs(d[2])});
+    for (double& x : d)
+        x /= largest;
+    const double length = std::sqrt(dot(d, d));
+    int least = 0;
+    for (int i = 0; i < 3; ++i) {
+        view.eye_mm[i] = origin_mm[size_t(i)];
+        view.w0[i] = d[i] / length;
+        if (std::abs(view.w0[i]) < std::abs(view.w0[least]))
+            least = i;
+    }
+    double axis[3] = {0, 0, 0};
+    axis[least] = 1;
+    cross(view.w0, axis, view.step_x);
+    const double across = std::sqrt(dot(view.step_x, view.step_x));
+    for (double& x : view.step_x)
+        x *= kPixel / across;
+    cross(view.w0, view.step_x, view.step_y);
+    finish_view(image, view);
+    return view;
+}
+
+void collect_candidates(const CpuScene& scene, const View& view, const PixelRect& rect, CandidateScratch& scratch,
+                        std::vector<Candidate>& out, WorkCounts& work)
+{
+    const PackImage& image = scene.image;
+    out.clear();
+    scratch.stack.clear();
+    const auto enter = [&](uint32_t index) {
+        const InstanceView& instance = view.instances[index];
+        const PartRecord& part = image.parts[image.instances[index].part];
+        if (part.node_count == 0)
+            return;
+        walk(image.part_nodes.data() + part.first_node, Frustum(instance, rect), scratch.stack, work, [&](uint leaf) {
+            Candidate candidate;
+            candidate.leaf = part.first_leaf + leaf;
+            candidate.instance = index;
+            if (project_box(scene.leaf_bounds[candidate.leaf], instance, rect, view.tau_ref, candidate))
+                out.push_back(candidate);
+        });
+    };
+    if (image.instances.size() == 1) {
+        enter(0);
+    } else if (!image.top_nodes.empty()) {
+        // the world's unit space seen as an instance
+        InstanceRecord world{};
+        world.transform[0] = world.transform[5] = world.transform[10] = 1;
+        PartRecord unit{};
+        for (int i = 0; i < 3; ++i)
+            unit.origin_mm[i] = image.world_origin_mm[i];
+        unit.scale_mm = image.world_scale_mm;
+        walk(image.top_nodes.data(), Frustum(view_from(world, unit, view), rect), scratch.stack, work, enter);
+    }
+    std::sort(out.begin(), out.end(), [](const Candidate& a, const Candidate& b) {
+        if (a.near_mm != b.near_mm)
+            return a.near_mm < b.near_mm;
+        return a.instance != b.instance ? a.instance < b.instance : a.leaf < b.leaf;
+    });
+}
+
+PatchView make_patch_view(const PatchRecord& patch, const InstanceView& instance, double tau_ref)
+{
+    double origin[3], middle[3];
+    for (int i = 0; i < 3; ++i)
+        origin[i] = double(patch.origin_hi[i]) + double(patch.origin_lo[i]) - instance.eye[i];
+    const double tau = dot(instance.row_tau, origin);
+    const double per_scale = 1 / double(patch.scale);
+    for (int i = 0; i < 3; ++i)
+        middle[i] = (tau * instance.w0[i] - origin[i]) * per_scale;
+    const float* axes[3] = {patch.axis_x, patch.axis_y, patch.axis_z};
+    PatchView out;
+    double largest = 0;
+    for (int a = 0; a < 3; ++a) {
+        const double axis[3] = {axes[a][0], axes[a][1], axes[a][2]};
+        out.origin[a] = float(dot(axis, middle));
+        out.w0[a] = float(dot(axis, instance.w0));
+        out.step_x[a] = float(dot(axis, instance.step_x));
+        out.step_y[a] = float(dot(axis, instance.step_y));
+        largest = std::max(largest, std::abs(double(out.origin[a])));
+    }
+    out.tau = float(tau * per_scale);
+    out.base_mm = float(tau / instance.k - tau_ref);
+    out.mm_per_t = float(patch.scale / instance.k);
+    // the patch's own arithmetic, |q| about 1, and one rounding of base_mm
+    out.slack_mm = float(4e-7 * (1 + largest) * out.mm_per_t + 1.2e-7 * std::abs(out.base_mm));
+    out.pixel = float(std::abs(tau) * per_scale * std::sqrt(dot(instance.step_x, instance.step_x)));
+    return out;
+}
+
+} // namespace trimray
