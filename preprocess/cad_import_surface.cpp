@@ -222,7 +222,7 @@ std::optional<ConvertedSurface> extrusion(const Geom_SurfaceOfLinearExtrusion& s
 }
 
 /// Lines and circles turned about an axis in their plane are cylinders, cones, spheres and tori; u is the angle in
-/// both, v may need an offset and a sign (in the map).
+/// both, v may need an offset (in the map).
 std::optional<ConvertedSurface> revolution(const Geom_SurfaceOfRevolution& source, double tolerance_mm)
 {
     const gp_Ax1 axis = source.Axis();
@@ -268,11 +268,11 @@ std::optional<ConvertedSurface> revolution(const Geom_SurfaceOfRevolution& sourc
             return std::nullopt; // its plane passes beside the axis
         x.Normalize();
         // the circle at parameter t: center + r (cos t X + sin t Y), with X = cos(phi) x + sin(phi) z, turning with or
-        // against x -> z: our v = phi + turn t
+        // against x -> z. The torus' z axis turns with it, so v = turn phi + t: a shift keeps the side of the loops
         const gp_XYZ cx = axes.XDirection().XYZ(), cy = axes.YDirection().XYZ();
         const double phi = std::atan2(cx.Dot(z), cx.Dot(x));
         const double turn = cx.Dot(x) * cy.Dot(z) - cx.Dot(z) * cy.Dot(x) > 0 ? 1 : -1;
-        s.frame = {vec(origin + z * z.Dot(center - origin)), vec(x), vec(z.Crossed(x)), vec(z)};
+        s.frame = {vec(origin + z * z.Dot(center - origin)), vec(x), vec(z.Crossed(x)), vec(turn * z)};
         if (!far) {
             // a sphere's v ends at its poles; a meridian that runs through one needs two of them
             return std::nullopt;
@@ -282,8 +282,7 @@ std::optional<ConvertedSurface> revolution(const Geom_SurfaceOfRevolution& sourc
         s.minor_radius = circle->Radius();
         s.period_v = kTwoPi;
         s.natural_bounds = {{0, 0}, {kTwoPi, kTwoPi}};
-        out.uv_map.v.scale = turn;
-        out.uv_map.v.offset = phi;
+        out.uv_map.v.offset = turn * phi;
         return out;
     }
     return std::nullopt;
