@@ -153,6 +153,18 @@ double unresolved_distance(const TrimMask& mask, std::span<const MonotonePiece> 
         return x >= 0 && y >= 0 && x < width && y < height && mask.inside[static_cast<size_t>(y) * mask.width + x] != 0;
     };
     constexpr double kStep = 0.5; // pixels between samples of a loop
+    constexpr int kReach = 64;    // pixels: farther than any band is wide
+    // distance from (x, y), in pixels, to the nearest centre of a kind: square rings around, until no ring is nearer
+    const auto nearest_centre = [&](double x, double y, bool kind) {
+        const int x0 = static_cast<int>(std::floor(x)), y0 = static_cast<int>(std::floor(y));
+        double nearest = kInfinity;
+        for (int ring = 1; ring <= kReach && (ring - 1) * std::min(pixel_u, pixel_v) < nearest; ++ring)
+            for (int dy = 1 - ring; dy <= ring; ++dy)
+                for (int dx = 1 - ring; dx <= ring; dx += dy == 1 - ring || dy == ring ? 1 : 2 * ring - 1)
+                    if (inside(x0 + dx, y0 + dy) == kind)
+                        nearest = std::min(nearest, std::hypot((x0 + dx - x) * pixel_u, (y0 + dy - y) * pixel_v));
+        return nearest;
+    };
     double worst = 0;
     for (const MonotonePiece& piece : pieces) {
         const double length =
@@ -164,16 +176,8 @@ double unresolved_distance(const TrimMask& mask, std::span<const MonotonePiece> 
             const double x = bezier3(piece.u, t) * width - 0.5, y = bezier3(piece.v, t) * height - 0.5;
             const int x0 = static_cast<int>(std::floor(x)), y0 = static_cast<int>(std::floor(y));
             const int sum = inside(x0, y0) + inside(x0 + 1, y0) + inside(x0, y0 + 1) + inside(x0 + 1, y0 + 1);
-            if (sum % 4 != 0) { // both kinds within the four centres around
-                worst = std::max(worst, std::hypot(pixel_u, pixel_v));
-                continue;
-            }
-            double nearest = kInfinity;
-            for (int dy = -2; dy <= 3; ++dy)
-                for (int dx = -2; dx <= 3; ++dx)
-                    if (inside(x0 + dx, y0 + dy) != (sum == 4))
-                        nearest = std::min(nearest, std::hypot((x0 + dx - x) * pixel_u, (y0 + dy - y) * pixel_v));
-            worst = std::max(worst, nearest);
+            // both kinds within the four centres around: no farther than the diagonal
+            worst = std::max(worst, sum % 4 != 0 ? std::hypot(pixel_u, pixel_v) : nearest_centre(x, y, sum == 0));
             if (worst == kInfinity)
                 return worst;
         }

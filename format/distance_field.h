@@ -28,7 +28,7 @@ TrimMask scan_convert(std::span<const MonotonePiece> pieces, uint width, uint he
 std::vector<float> signed_distances(const TrimMask& mask, uint oversampling, double pixel_u, double pixel_v);
 
 /// How far, at most, a point of the loops lies from the nearest pixel centre of either kind: what the mask does not
-/// resolve. Infinite where a loop's inside or outside is thinner than about three pixels and left no pixel.
+/// resolve. Infinite where a loop's inside or outside left no pixel within 64.
 double unresolved_distance(const TrimMask& mask, std::span<const MonotonePiece> pieces, double pixel_u, double pixel_v);
 
 /// Pixels a texel in each direction that derive_sdf uses for a texture of this size.

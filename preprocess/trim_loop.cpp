@@ -175,9 +175,9 @@ Result<TrimLoops> build_trim_loops(const CadFace& face, const TrimOptions& optio
     std::vector<TrimChain> chains = build_chains(face, options.tolerance, metric, report);
     if (!report.failure.empty())
         return invalid(face, report.failure);
-    const std::string failure = close_and_wrap(chains, face.surface, metric, loops.domain);
-    if (!failure.empty())
-        return invalid(face, failure);
+    close_and_wrap(chains, face.surface, metric, loops.domain, report);
+    if (!report.failure.empty())
+        return invalid(face, report.failure);
     const Vec2d size{loops.domain.hi.x - loops.domain.lo.x, loops.domain.hi.y - loops.domain.lo.y};
     // narrower than rounding of its own coordinates: no area
     const double ulp = 1e-14 * std::max({std::abs(loops.domain.lo.x), std::abs(loops.domain.hi.x),

@@ -131,21 +131,35 @@ double far_border(const CadSurface& surface, Axis axis, bool upper)
 }
 
 /// Joins the chains that go around once. Each lies on [start, start + period] along the axis afterwards.
-std::string join_winding(std::vector<TrimChain>& chains, const CadSurface& surface, Axis axis)
+void join_winding(std::vector<TrimChain>& chains, const CadSurface& surface, Axis axis, const TrimMetric& metric,
+                  ChainReport& report)
 {
     const double period = axis.period(surface);
     std::vector<TrimChain> closed, winding;
     for (TrimChain& chain : chains) {
         const int turns = axis.winding(chain);
-        if (turns != 0 && (chain.winding_u != 0) == (chain.winding_v != 0))
-            return "a loop goes around both directions of the surface at once";
-        if (std::abs(turns) > 1)
-            return "a loop goes around the surface more than once before it closes";
+        if (turns != 0 && (chain.winding_u != 0) == (chain.winding_v != 0)) {
+            report.failure = "a loop goes around both directions of the surface at once";
+            return;
+        }
+        if (std::abs(turns) > 1) {
+            report.failure = "a loop goes around the surface more than once before it closes";
+            return;
+        }
         (turns == 0 ? closed : winding).push_back(std::move(chain));
+    }
+    if (winding.size() == 1 && std::isnan(far_border(surface, axis, false)) &&
+        std::isnan(far_border(surface, axis, true))) {
+        Pieces& pieces = winding.front().pieces;
+        report.largest_gap_mm = std::max(report.largest_gap_mm, period * axis.scale(metric));
+        report.had_open_loop = true;
+        pieces.push_back(line_piece(pieces.back().p[3], pieces.front().p[0]));
+        closed.push_back(std::move(winding.front()));
+        winding.clear();
     }
     if (winding.empty()) {
         chains = std::move(closed);
-        return {};
+        return;
     }
     const double start =
         std::min(axis.along(winding.front().pieces.front().p[0]), axis.along(winding.front().pieces.back().p[3]));
@@ -186,15 +200,15 @@ std::string join_winding(std::vector<TrimChain>& chains, const CadSurface& surfa
     if (bands.size() % 2 != 0) {
         // the outermost loop that has its face beyond it, or the outermost at all
         bool upper = upper_side(bands.back());
-        if (bands.size() > 1 && !upper && upper_side(bands.front()))
-            return "an odd number of loops goes around the surface";
         double border = far_border(surface, axis, upper);
         if (std::isnan(border)) {
             upper = !upper;
             border = far_border(surface, axis, upper);
         }
-        if (std::isnan(border))
-            return "one loop goes around a surface that has no end on either side";
+        if (std::isnan(border)) {
+            report.failure = "an odd number of loops goes around a surface that has no end on either side";
+            return;
+        }
         Band pole{{line_piece(axis.point(start, border), axis.point(start + period, border))}, true, border};
         bands.insert(border > bands.back().at_border ? bands.end() : bands.begin(), std::move(pole));
     }
@@ -211,7 +225,6 @@ std::string join_winding(std::vector<TrimChain>& chains, const CadSurface& surfa
         closed.push_back(std::move(loop));
     }
     chains = std::move(closed);
-    return {};
 }
 
 /// Whether only holes of a closed surface are given: every loop runs clockwise, and none spans a period.
@@ -295,13 +308,13 @@ void wrap(std::vector<TrimChain>& chains, const CadSurface& surface, Axis axis, 
 
 } // namespace
 
-std::string close_and_wrap(std::vector<TrimChain>& chains, const CadSurface& surface, const TrimMetric& metric,
-                           Rect2d& domain)
+void close_and_wrap(std::vector<TrimChain>& chains, const CadSurface& surface, const TrimMetric& metric, Rect2d& domain,
+                    ChainReport& report)
 {
     for (const Axis axis : {Axis{false}, Axis{true}}) {
-        std::string failure = join_winding(chains, surface, axis);
-        if (!failure.empty())
-            return failure;
+        join_winding(chains, surface, axis, metric, report);
+        if (!report.failure.empty())
+            return;
     }
     if (only_holes(chains, surface))
         chains.insert(chains.begin(), rectangle(surface.natural_bounds));
@@ -313,7 +326,6 @@ std::string close_and_wrap(std::vector<TrimChain>& chains, const CadSurface& sur
         domain.lo = {std::min(domain.lo.x, r.lo.x), std::min(domain.lo.y, r.lo.y)};
         domain.hi = {std::max(domain.hi.x, r.hi.x), std::max(domain.hi.y, r.hi.y)};
     }
-    return {};
 }
 
 } // namespace trimray

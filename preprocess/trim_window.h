@@ -3,7 +3,8 @@
 // Even-odd makes both steps simple. A loop that leaves the window is walked again one period over, and every walk is
 // pressed against the window's border where it leaves: the loop stays closed, and no crossing count inside the window
 // changes. Loops that go once around are cut at the window's border, ordered across it and joined in pairs along it;
-// one that is left over encloses a pole or an apex, and is joined with the border there.
+// one that is left over encloses a pole or an apex, and is joined with the border there. Where the surface has no end,
+// such a loop cannot be right: it is closed along a straight line, as an open loop is.
 #pragma once
 
 #include "preprocess/trim_chain.h"
@@ -11,8 +12,8 @@
 namespace trimray {
 
 /// Turns every chain into closed loops within `domain`, which becomes their window (periodic directions) and bounding
-/// rectangle. Returns why that is impossible, or nothing. `surface` gives periods and natural bounds.
-std::string close_and_wrap(std::vector<TrimChain>& chains, const CadSurface& surface, const TrimMetric& metric,
-                           Rect2d& domain);
+/// rectangle. What cannot be done is in report.failure. `surface` gives periods and natural bounds.
+void close_and_wrap(std::vector<TrimChain>& chains, const CadSurface& surface, const TrimMetric& metric, Rect2d& domain,
+                    ChainReport& report);
 
 } // namespace trimray
