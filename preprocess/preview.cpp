@@ -107,10 +107,9 @@ std::string find_trimray_program()
     const fs::path self = fs::read_symlink("/proc/self/exe", error);
     if (error)
         return {};
-    for (const fs::path& candidate :
-         {self.parent_path() / "trimray", self.parent_path().parent_path() / "runtime" / "trimray"})
-        if (access(candidate.c_str(), X_OK) == 0 && fs::is_regular_file(candidate, error))
-            return candidate.string();
+    const fs::path candidate = self.parent_path() / "trimray";
+    if (access(candidate.c_str(), X_OK) == 0 && fs::is_regular_file(candidate, error))
+        return candidate.string();
     return {};
 }
 

@@ -14,7 +14,7 @@ namespace trimray {
 /// status).
 Status add_previews(PackImage& image, const std::string& trimray_program);
 
-/// The `trimray` that belongs to this program: beside it, else in ../runtime of a build tree; empty when there is none.
+/// The `trimray` that belongs to this program: beside it; empty when there is none.
 std::string find_trimray_program();
 
 } // namespace trimray
