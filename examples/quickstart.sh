@@ -31,14 +31,7 @@ cmake -S . -B build-quickstart -G Ninja -DCMAKE_BUILD_TYPE=Release -DTRIMRAY_TES
 cmake --build build-quickstart --target trimray trimray-pack
 
 say "Convert $model"
-name=$(basename "$model")
-case $name in
-    *.zst)
-        zstd -d -q -f "$model" -o "build-quickstart/${name%.zst}"
-        model=build-quickstart/${name%.zst}
-        name=${name%.zst}
-        ;;
-esac
+name=$(basename "${model%.zst}")
 pack=build-quickstart/${name%.*}.tray
 picture=build-quickstart/${name%.*}.png
 status=0

@@ -11,8 +11,11 @@ class App;
 
 namespace trimray {
 
+void register_render(CLI::App& app, int& exit_code);
 void register_info(CLI::App& app, int& exit_code);
 void register_validate(CLI::App& app, int& exit_code);
+void register_thumbnail(CLI::App& app, int& exit_code);
+void register_preview(CLI::App& app, int& exit_code);
 void register_version(CLI::App& app, int& exit_code);
 
 /// Programs of their own that run as subcommands, as git's do: `trimray pack` runs `trimray-pack` with all arguments.

@@ -86,7 +86,8 @@ int run(const std::vector<std::string>& arguments)
     int exit_code = kExitOk;
     for (const ExternalCommand& command : external_commands())
         register_external(app, command);
-    for (const auto register_command : {register_info, register_validate, register_version})
+    for (const auto register_command :
+         {register_render, register_info, register_validate, register_thumbnail, register_preview, register_version})
         register_command(app, exit_code);
 
     if (arguments.empty()) {
@@ -113,8 +114,10 @@ int run(const std::vector<std::string>& arguments)
             return app.exit(error);
         const CLI::App* command = find_command(app, name);
         const std::string where = command ? name : "";
+        if (!command) // not a word, so not a command: an option that nobody takes
+            return usage_error("", fmt::format("unexpected argument '{}'", name), see_help(""));
         if (dynamic_cast<const CLI::ExtrasError*>(&error))
-            return unexpected_argument(command ? *command : app, where);
+            return unexpected_argument(*command, where);
         return usage_error(where, error.what(), see_help(where));
     }
     return exit_code;

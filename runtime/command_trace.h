@@ -1,0 +1,50 @@
+// What the subcommands that make pictures share: which device traces, from where, and at how many samples.
+#pragma once
+
+#include "format/result.h"
+#include "runtime/tracer.h"
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace trimray {
+
+/// Names a command line takes for a choice; those that `available` leaves out are known but not in this build.
+struct Choice {
+    const char* option;
+    std::vector<std::string> known, available;
+};
+const Choice& trim_choice();
+const Choice& closest_choice();
+const Choice& device_choice();
+
+/// Fails: Usage (unknown; the nearest is suggested), UnsupportedFormat (known, not in this build; the others are
+/// named).
+Status check_choice(const Choice& choice, const std::string& value);
+
+/// Domain: names of trim_choice().available.
+TrimMode trim_mode(const std::string& name);
+const char* trim_name(TrimMode mode);
+
+/// A tracer for `device`: "cpu", "vulkan" (software drivers too), or "auto": a hardware GPU where there is one, else
+/// the CPU; `note` says which and why. Fails: NoDevice, DeviceFailed, UnsupportedPackFeature.
+Result<std::unique_ptr<Tracer>> make_tracer(const std::shared_ptr<const Scene>& scene, const std::string& device,
+                                            std::string& note);
+
+/// Where the picture is taken from, as the command line says it.
+struct ViewArguments {
+    std::string view = "iso", eye, target, up;
+    double fov_deg = 35;
+};
+
+/// Without an eye: the model framed whole from the named view. Without a target: the middle of the model.
+/// Fails: Usage.
+Result<Camera> camera_of(const ViewArguments& arguments, const PackImage& image, uint32_t width, uint32_t height);
+
+/// Traces at samples x samples the resolution and averages (colours only, when samples > 1). The counts in `stats` are
+/// of all samples. Fails: as Tracer::render.
+Result<Frame> trace_picture(Tracer& tracer, RenderOptions options, uint32_t samples, RenderStats& stats);
+
+} // namespace trimray

@@ -1,0 +1,428 @@
+"""The command line as outside programs see it: what is printed where, the shape of the JSON, and the exit codes.
+
+usage: cli_test.py --bin FOLDER [--sanitized] [unittest arguments]
+FOLDER holds trimray and, where the converter is built, trimray-pack; without it the packs under golden/ stand in.
+"""
+
+import argparse
+import json
+import os
+import shutil
+import statistics
+import struct
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+import zlib
+from pathlib import Path
+
+TESTS = Path(__file__).resolve().parent
+MODEL = TESTS / "models" / "io1-cm-214.stp"  # 29 faces: planes, cylinders, tori; colours
+COMMANDS = ["pack", "render", "info", "validate", "thumbnail", "preview", "version"]
+OPTIONS = None  # parsed arguments
+WORK = None  # a temporary folder
+PACK = None  # a valid pack
+
+
+def run(*arguments, env=None, cwd=None, program="trimray"):
+    """The finished process, its output as text."""
+    command = [str(OPTIONS.bin / program), *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=120, env=env, cwd=cwd, check=False)
+
+
+def read_png(path):
+    """Width, height and rows of RGBA bytes of an 8-bit RGBA PNG. Knows the five filters, not interlacing."""
+    data = Path(path).read_bytes()
+    assert data[:8] == b"\x89PNG\r\n\x1a\n", f"{path} is no PNG"
+    at, packed = 8, b""
+    while at < len(data):
+        (size,), kind = struct.unpack(">I", data[at : at + 4]), data[at + 4 : at + 8]
+        body = data[at + 8 : at + 8 + size]
+        if kind == b"IHDR":
+            width, height, depth, color = struct.unpack(">IIBB", body[:10])
+            assert (depth, color) == (8, 6), f"{path}: depth {depth}, colour type {color}"
+        elif kind == b"IDAT":
+            packed += body
+        at += 12 + size
+    raw, stride = zlib.decompress(packed), width * 4
+    rows, above = [], bytes(stride)
+    for y in range(height):
+        method, line = raw[y * (stride + 1)], bytearray(raw[y * (stride + 1) + 1 : (y + 1) * (stride + 1)])
+        for x in range(stride):
+            left = line[x - 4] if x >= 4 else 0
+            corner = above[x - 4] if x >= 4 else 0
+            if method == 1:
+                line[x] = (line[x] + left) & 255
+            elif method == 2:
+                line[x] = (line[x] + above[x]) & 255
+            elif method == 3:
+                line[x] = (line[x] + (left + above[x]) // 2) & 255
+            elif method == 4:
+                p = left + above[x] - corner
+                near = min((abs(p - left), 0, left), (abs(p - above[x]), 1, above[x]), (abs(p - corner), 2, corner))
+                line[x] = (line[x] + near[2]) & 255
+        rows.append(bytes(line))
+        above = rows[-1]
+    return width, height, rows
+
+
+def alphas(rows):
+    return [row[x] for row in rows for x in range(3, len(row), 4)]
+
+
+class CliTest(unittest.TestCase):
+    needs_pack = False  # a real model, not a golden pack
+
+    def setUp(self):
+        if self.needs_pack and not OPTIONS.has_pack:
+            self.skipTest("no converter in this build")
+
+    def ok(self, *arguments, **keywords):
+        done = run(*arguments, **keywords)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        return done
+
+    def fails(self, code, *arguments, says, **keywords):
+        """The command ends with `code`, nothing on stdout, and one line on stderr that holds all of `says`."""
+        done = run(*arguments, **keywords)
+        self.assertEqual(done.returncode, code, done.stderr)
+        self.assertEqual(done.stdout, "")
+        lines = done.stderr.splitlines()
+        self.assertEqual(len(lines), 1, done.stderr)
+        self.assertTrue(lines[0].startswith("trimray"), lines[0])
+        for words in says:
+            self.assertIn(words, lines[0])
+        return done
+
+    def json_of(self, *arguments):
+        """The one object on stdout, and what was said on stderr."""
+        done = self.ok(*arguments)
+        self.assertEqual(len(done.stdout.splitlines()), 1, "one object, one line")
+        return json.loads(done.stdout)
+
+
+class Usage(CliTest):
+    def test_no_arguments_print_the_help(self):
+        done = self.ok()
+        for command in COMMANDS:
+            self.assertRegex(done.stdout, rf"(?m)^  {command} ")
+        self.assertEqual(done.stdout, self.ok("--help").stdout)
+
+    def test_every_command_explains_itself_with_an_example(self):
+        for command in COMMANDS:
+            if command == "pack" and not OPTIONS.has_pack:
+                continue
+            text = self.ok(command, "--help").stdout
+            self.assertIn("Example", text, command)
+            self.assertRegex(text, rf"trimray[ -]{command} ", command)
+
+    def test_unknown_commands_and_options_suggest_the_nearest(self):
+        self.fails(1, "rendr", says=["no command 'rendr'", "did you mean 'render'?"])
+        self.fails(1, "val", says=["did you mean 'validate'?"])
+        self.fails(1, "frobnicate", says=["no command 'frobnicate'", "trimray --help"])
+        self.fails(1, "render", "a.tray", "-o", "a.png", "--sise", "1x1", says=["'--sise'", "did you mean '--size'?"])
+        self.fails(1, "--frob", says=["--frob"])
+
+    def test_missing_arguments_are_usage_errors(self):
+        for command in ["render", "info", "validate", "thumbnail", "preview"]:
+            self.fails(1, command, says=[command, "required", f"trimray {command} --help"])
+
+    def test_version_is_the_same_everywhere(self):
+        text = self.ok("--version").stdout
+        self.assertRegex(text, r"^trimray \d+\.\d+\.\d+\n$")
+        self.assertEqual(self.ok("version").stdout, text)
+        self.assertEqual("trimray " + self.json_of("version", "--json")["version"], text.strip())
+
+    def test_a_full_disk_behind_stdout_is_an_error(self):
+        with open("/dev/full", "w", encoding="ascii") as full:
+            done = subprocess.run([OPTIONS.bin / "trimray", "version"], stdout=full, stderr=subprocess.PIPE, text=True,
+                                  check=False)
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("stdout", done.stderr)
+
+    def test_pack_is_found_beside_trimray_then_in_libexec_then_in_path(self):
+        """With stand-ins that say where they lie; the folders are made anew, so nothing else is found."""
+        prefix, other = WORK / "prefix", WORK / "other"
+        for folder in [prefix / "bin", prefix / "libexec" / "trimray", other]:
+            folder.mkdir(parents=True)
+            stand_in = folder / "trimray-pack"
+            stand_in.write_text('#!/bin/sh\necho "$0 $*"; exit 6\n', encoding="ascii")
+            stand_in.chmod(0o755)
+        shutil.copy2(OPTIONS.bin / "trimray", prefix / "bin" / "trimray")
+        env = dict(os.environ, PATH=f"{other}:/usr/bin:/bin")
+        for folder in [prefix / "bin", prefix / "libexec" / "trimray", other]:
+            done = subprocess.run([prefix / "bin" / "trimray", "pack", "a b.step", "--json", "-o", "x"], env=env,
+                                  capture_output=True, text=True, check=False)
+            self.assertEqual(done.returncode, 6, "the program's own exit code comes through")
+            self.assertIn(str(folder) if folder != other else "trimray-pack", done.stdout)
+            self.assertIn("a b.step --json -o x", done.stdout)
+            (folder / "trimray-pack").unlink()
+        done = subprocess.run([prefix / "bin" / "trimray", "pack", "x"], env=env, capture_output=True, text=True,
+                              check=False)
+        self.assertEqual(done.returncode, 4)
+        self.assertIn("trimray-pack: not found", done.stderr)
+        self.assertIn("TRIMRAY_PREPROCESS", done.stderr)
+
+
+class Start(CliTest):
+    """The runtime starts fast: what it does not need is not loaded."""
+
+    def test_neither_the_cad_kernel_nor_the_picture_library_is_linked(self):
+        for file in [OPTIONS.bin / "trimray", OPTIONS.bin.parent / "lib" / "libtrimray.so"]:
+            linked = subprocess.run(["ldd", file], capture_output=True, text=True, check=True).stdout
+            self.assertIn("libc.so", linked)
+            self.assertNotRegex(linked, r"libTK|OpenImageIO|OpenColorIO|libdraco|libvulkan|not found")
+
+    def test_the_picture_library_is_loaded_only_for_pictures(self):
+        env = dict(os.environ, LD_DEBUG="files")
+        self.assertNotIn("OpenImageIO", run("info", PACK, env=env).stderr)
+        done = run("render", PACK, "-o", WORK / "loaded.png", "--size", "8x8", "--device", "cpu", env=env)
+        self.assertIn("OpenImageIO", done.stderr)
+
+    def test_version_takes_less_than_50_ms(self):
+        if OPTIONS.sanitized:
+            self.skipTest("sanitizers take their time")
+        times = []
+        for _ in range(15):
+            begin = time.perf_counter()
+            run("--version")
+            times.append(time.perf_counter() - begin)
+        self.assertLess(statistics.median(times), 0.050)
+
+
+class Info(CliTest):
+    KEYS = ["version", "source", "units", "faces", "faces_by_kind", "instances", "patches", "leaves", "parts",
+            "bounds_mm", "bytes_by_section", "effects", "dropped"]
+
+    def test_json_has_the_agreed_keys(self):
+        info = self.json_of("info", PACK, "--json")
+        self.assertEqual(list(info)[: len(self.KEYS)], self.KEYS)
+        self.assertRegex(info["version"], r"^\d+\.\d+$")
+        self.assertEqual(sum(info["faces_by_kind"].values()), info["faces"])
+        self.assertLessEqual(sum(info["bytes_by_section"].values()), PACK.stat().st_size)
+        lo, hi = info["bounds_mm"]
+        for axis in range(3):
+            self.assertLess(lo[axis], hi[axis])
+        for item in info["effects"]:
+            self.assertEqual(set(item), {"name", "why"})
+            self.assertTrue(item["name"] and item["why"])
+
+    def test_json_says_what_is_in_the_model(self):
+        if not OPTIONS.has_pack:
+            self.skipTest("no converter in this build")
+        info = self.json_of("info", PACK, "--json")
+        self.assertEqual(info["source"], MODEL.name)
+        self.assertEqual(info["units"].upper(), "MM")
+        self.assertEqual(info["faces"], 29)
+        self.assertEqual(info["faces_by_kind"]["plane"], 5)
+        self.assertEqual(info["faces_by_kind"]["cylinder"], 22)
+        self.assertEqual(info["faces_by_kind"]["torus"], 2)
+        self.assertEqual(info["dropped"], [])
+        names = [item["name"] for item in info["effects"]]
+        self.assertTrue({"plane", "cylinder", "torus", "trim-exact"} <= set(names), names)
+        self.assertNotIn("sphere", names)
+
+    def test_text_says_the_same(self):
+        text = self.ok("info", PACK).stdout
+        info = self.json_of("info", PACK, "--json")
+        self.assertIn(info["source"], text)
+        self.assertRegex(text, rf"(?m)^faces +{info['faces']}\b")
+        for section, stored in info["bytes_by_section"].items():
+            self.assertRegex(text, rf"(?m)^{section} .* {stored} ")
+        for item in info["effects"]:
+            self.assertIn(item["why"], text)
+
+    def test_missing_files_and_files_that_are_no_packs(self):
+        no_pack = WORK / "no_pack.tray"
+        no_pack.write_text("solid of words\n" * 100, encoding="ascii")
+        empty = WORK / "empty.tray"
+        empty.write_bytes(b"")
+        cut = WORK / "cut.tray"
+        cut.write_bytes(PACK.read_bytes()[: PACK.stat().st_size // 2])
+        for command, rest in [("info", []), ("validate", []), ("render", ["-o", WORK / "x.png"]),
+                              ("thumbnail", [WORK / "x.png"]), ("preview", ["-o", WORK / "x"])]:
+            self.fails(2, command, WORK / "missing.tray", *rest, says=["missing.tray"])
+            self.fails(2, command, WORK, *rest, says=[str(WORK)])  # a folder
+            for file in [no_pack, empty, cut]:
+                done = run(command, file, *rest)
+                self.assertEqual(done.returncode, 3, f"{command} {file}: {done.stderr}")
+                self.assertEqual(len(done.stderr.splitlines()), 1, done.stderr)
+                self.assertIn(file.name, done.stderr)
+        self.assertFalse((WORK / "x.png").exists())
+
+
+class Validate(CliTest):
+    def test_a_valid_pack_has_no_findings(self):
+        self.assertIn("valid", self.ok("validate", PACK).stdout)
+        report = self.json_of("validate", PACK, "--json")
+        self.assertEqual((report["valid"], report["findings"]), (True, []))
+
+    def test_a_changed_byte_is_a_numbered_finding(self):
+        data = bytearray(PACK.read_bytes())
+        data[len(data) * 2 // 3] ^= 0x10
+        broken = WORK / "broken.tray"
+        broken.write_bytes(data)
+        done = run("validate", broken)
+        self.assertEqual(done.returncode, 3)
+        self.assertRegex(done.stdout, r"broken\.tray: .+ \[F\d+\]")
+        done = run("validate", broken, "--json")
+        self.assertEqual(done.returncode, 3)
+        report = json.loads(done.stdout)
+        self.assertFalse(report["valid"])
+        for finding in report["findings"]:
+            self.assertEqual(set(finding), {"number", "section", "detail"})
+            self.assertGreater(finding["number"], 0)
+
+
+class Render(CliTest):
+    needs_pack = True
+    KEYS = ["device", "width", "height", "frames", "trim", "closest", "ms_per_frame", "rays_per_second", "bytes",
+            "effects", "uncertified_pixels", "work"]
+
+    def render(self, name, *arguments):
+        self.ok("render", PACK, "-o", WORK / name, "--device", "cpu", *arguments)
+        return WORK / name
+
+    def test_json_has_the_agreed_keys(self):
+        report = self.json_of("render", PACK, "-o", WORK / "a.png", "--size", "64x48", "--device", "cpu", "--frames", 3,
+                              "--trim", "exact", "--json")
+        self.assertEqual(list(report), self.KEYS)
+        self.assertEqual((report["width"], report["height"], report["frames"]), (64, 48, 3))
+        self.assertEqual((report["trim"], report["closest"]), ("exact", "certified"))
+        times = report["ms_per_frame"]
+        self.assertEqual(list(times), ["median", "min", "max"])
+        self.assertTrue(0 < times["min"] <= times["median"] <= times["max"])
+        self.assertAlmostEqual(report["rays_per_second"] * times["median"] / 1000 / (64 * 48), 1, 3)
+        self.assertEqual(list(report["bytes"]), ["geometry", "bvh", "trim_exact", "trim_sdf", "trim_kd", "total"])
+        self.assertEqual(sum(report["bytes"].values()), 2 * report["bytes"]["total"])
+        self.assertEqual(list(report["work"]), ["leaf_visits", "newton_steps", "curve_tests"])
+        self.assertGreater(report["work"]["leaf_visits"], 0)
+        self.assertTrue(all(isinstance(name, str) for name in report["effects"]))
+
+    def test_png_shows_the_model_whole_on_nothing(self):
+        width, height, rows = read_png(self.render("b.png", "--size", "80x60"))
+        self.assertEqual((width, height), (80, 60))
+        seen = alphas(rows)
+        self.assertEqual(set(seen), {0, 255})
+        self.assertGreater(seen.count(255), 80 * 60 // 10)
+        border = rows[0] + rows[-1] + b"".join(row[:4] + row[-4:] for row in rows)
+        self.assertEqual(max(border[3::4]), 0, "framed whole: nothing touches the border")
+
+    def test_samples_smooth_the_edges_and_a_background_fills_the_rest(self):
+        _, _, rows = read_png(self.render("c.png", "--size", "40x30", "--samples", 4))
+        self.assertGreater(len(set(alphas(rows))), 4)
+        _, _, rows = read_png(self.render("d.png", "--size", "40x30", "--background", "#102030"))
+        self.assertEqual(set(alphas(rows)), {255})
+        self.assertEqual(rows[0][:3], b"\x10\x20\x30")
+
+    def test_the_same_picture_on_any_number_of_threads(self):
+        one = self.render("one.exr", "--size", "64x48", "--threads", 1).read_bytes()
+        self.assertEqual(one, self.render("two.exr", "--size", "64x48", "--threads", 2).read_bytes())
+
+    def test_views_differ_and_an_eye_stands_where_it_is_told(self):
+        front = self.render("front.png", "--size", "40x30", "--view", "front").read_bytes()
+        top = self.render("top.png", "--size", "40x30", "--view", "top").read_bytes()
+        self.assertFalse(front == top)
+        away = ["--size", "40x30", "--eye", "-.5,-99999,1e2", "--target", "0,-199999,0", "--up", "0,0,1"]
+        self.assertEqual(set(alphas(read_png(self.render("away.png", *away))[2])), {0}, "it looks away from the model")
+
+    def test_auto_says_which_device_and_why(self):
+        done = self.ok("render", PACK, "-o", WORK / "e.png", "--size", "8x8", "--json")
+        self.assertRegex(done.stderr, r"^trimray: tracing on [^\n]*\n$")
+        device = json.loads(done.stdout)["device"]
+        self.assertIn(device, done.stderr)
+        self.assertNotIn("llvmpipe", device, "never a software driver unasked")
+
+    def test_modes_that_do_not_exist_name_those_that_do(self):
+        for option, value in [("--trim", "kd"), ("--trim", "hybrid"), ("--closest", "stochastic"), ("--scene", "a.json")]:
+            self.fails(4, "render", PACK, "-o", WORK / "f.png", option, value, says=[option])
+        self.fails(4, "render", PACK, "-o", WORK / "f.png", "--trim", "kd", says=["auto, exact, sdf"])
+        self.fails(4, "render", PACK, "-o", WORK / "f.jpg", says=["f.jpg", ".png", ".exr"])
+        self.assertFalse((WORK / "f.png").exists())
+
+    def test_wrong_values_are_usage_errors(self):
+        for option, value in [("--size", "640"), ("--size", "0x5"), ("--size", "5x-5"), ("--size", "9999999x9"),
+                              ("--size", "60000x60000"), ("--trim", "exakt"), ("--device", "gpu"), ("--fov", "180"),
+                              ("--fov", "nan"), ("--eye", "1,2"), ("--eye", "1,2,nan"), ("--eye", "a,b,c"),
+                              ("--view", "isometric"), ("--target", "1,2,3"), ("--background", "#12345"),
+                              ("--frames", "0"), ("--threads", "-1"), ("--samples", "0"), ("--error-px", "0")]:
+            self.fails(1, "render", PACK, "-o", WORK / "g.png", option, value, says=[option])
+        self.fails(1, "render", PACK, "-o", WORK / "g.exr", "--samples", 2, says=["--samples", "EXR"])
+        self.fails(1, "render", PACK, "-o", WORK / "g.png", "--view", "top", "--eye", "1,2,3", says=["--eye"])
+        self.fails(1, "render", PACK, "-o", WORK / "g.png", "--trim", "exakt", says=["did you mean 'exact'?"])
+
+    def test_a_picture_that_cannot_be_written_is_named(self):
+        target = WORK / "no_such_folder" / "h.png"
+        self.fails(2, "render", PACK, "-o", target, "--size", "8x8", "--device", "cpu", says=[str(target)])
+
+
+class Thumbnail(CliTest):
+    needs_pack = True
+
+    def test_previews_are_square_and_scaled(self):
+        self.ok("preview", PACK, "-o", WORK / "p")
+        self.assertEqual(read_png(WORK / "p-256.png")[:2], (256, 256))
+        self.assertEqual(read_png(WORK / "p-512.png")[:2], (512, 512))
+        for size in [16, 256, 512]:
+            self.ok("thumbnail", "-s", size, PACK, WORK / "t.png")
+            width, height, rows = read_png(WORK / "t.png")
+            self.assertEqual((width, height), (size, size))
+            covered = sum(alphas(rows)) / 255 / size**2
+            self.assertTrue(0.1 < covered < 0.9, covered)
+
+    def test_the_stored_preview_is_what_the_tracer_shows(self):
+        self.ok("preview", PACK, "-o", WORK / "q")
+        self.ok("thumbnail", PACK, WORK / "t256.png")
+        self.assertEqual((WORK / "q-256.png").read_bytes(), (WORK / "t256.png").read_bytes())
+
+
+class Pack(CliTest):
+    needs_pack = True
+
+    def test_json_has_the_agreed_keys(self):
+        report = self.json_of("pack", MODEL, "-o", WORK / "again.tray", "--json")
+        for key in ["faces", "converted", "dropped", "seconds", "bytes"]:
+            self.assertIn(key, report)
+        self.assertEqual((report["faces"], report["converted"], report["dropped"]), (29, 29, []))
+        self.assertTrue({"read", "transfer", "convert", "trims", "bvh", "write"} <= set(report["seconds"]))
+
+    def test_the_same_model_gives_the_same_bytes(self):
+        self.ok("pack", MODEL, "-o", WORK / "same.tray")
+        self.assertEqual(PACK.read_bytes(), (WORK / "same.tray").read_bytes())
+
+    def test_errors_have_their_exit_codes(self):
+        self.assertEqual(run("pack").returncode, 1)
+        self.assertEqual(run("pack", MODEL, "-o", WORK / "x.tray", "--frob").returncode, 1)
+        self.assertEqual(run("pack", WORK / "missing.step", "-o", WORK / "x.tray").returncode, 2)
+        junk = WORK / "junk.step"
+        junk.write_text("not a model\n", encoding="ascii")
+        self.assertEqual(run("pack", junk, "-o", WORK / "x.tray").returncode, 3)
+        self.assertEqual(run("pack", MODEL, "-o", WORK / "no_folder" / "x.tray").returncode, 2)
+        self.assertFalse((WORK / "x.tray").exists())
+
+
+def main():
+    global OPTIONS, WORK, PACK
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--bin", type=Path, required=True)
+    parser.add_argument("--sanitized", action="store_true")
+    OPTIONS, rest = parser.parse_known_args()
+    OPTIONS.bin = OPTIONS.bin.resolve()
+    OPTIONS.has_pack = (OPTIONS.bin / "trimray-pack").exists()
+    os.environ["LC_ALL"] = "C.UTF-8"
+    with tempfile.TemporaryDirectory(prefix="trimray-cli-") as folder:
+        WORK = Path(folder)
+        PACK = WORK / "model.tray"
+        if OPTIONS.has_pack:
+            done = run("pack", MODEL, "-o", PACK)
+            if done.returncode != 0:
+                sys.exit(f"the test's model cannot be packed: {done.stderr}")
+        else:
+            shutil.copy2(sorted((TESTS / "golden").glob("*.tray"))[0], PACK)
+        unittest.main(argv=[sys.argv[0], *rest])
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,59 @@
+"""Installs the build into an empty folder and uses it as a stranger would: the programs from there, and a program of
+one's own against the CMake package. usage: install_test.py --build FOLDER --cmake PROGRAM"""
+
+import argparse
+import os
+import re
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+TESTS = Path(__file__).resolve().parent
+EXAMPLE = TESTS.parent / "examples" / "trace_one_ray"
+SPHERE = TESTS / "models" / "revolved_sphere.step"  # one full sphere: a ray down its axis hits its pole
+
+
+def run(*command, env=None):
+    done = subprocess.run([str(word) for word in command], capture_output=True, text=True, env=env, check=False)
+    if done.returncode != 0:
+        sys.exit(f"{command} ended with {done.returncode}:\n{done.stdout}{done.stderr}")
+    return done.stdout
+
+
+def expect(holds, what):
+    if not holds:
+        sys.exit(f"failed: {what}")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--build", type=Path, required=True)
+    parser.add_argument("--cmake", required=True)
+    options = parser.parse_args()
+    with tempfile.TemporaryDirectory(prefix="trimray-install-") as folder:
+        prefix, example, pack = Path(folder) / "prefix", Path(folder) / "example", Path(folder) / "sphere.tray"
+        run(options.cmake, "--install", options.build, "--prefix", prefix)
+        # nothing of the build tree is needed: the programs find each other and the picture module by themselves
+        clean = {"PATH": "/usr/bin:/bin", "LC_ALL": "C.UTF-8", "TMPDIR": os.environ.get("TMPDIR", "/tmp")}
+        trimray = prefix / "bin" / "trimray"
+        run(trimray, "pack", SPHERE, "-o", pack, env=clean)
+        run(trimray, "render", pack, "-o", Path(folder) / "a.png", "--size", "32x32", "--device", "cpu", env=clean)
+        expect((Path(folder) / "a.png").read_bytes().startswith(b"\x89PNG"), "the installed program writes a picture")
+
+        headers = sorted(path.name for path in (prefix / "include" / "trimray" / "runtime").iterdir())
+        expect(headers == ["camera.h", "image_io.h", "tracer.h"], f"public headers, found {headers}")
+        run(options.cmake, "-S", EXAMPLE, "-B", example, "-G", "Ninja", f"-DCMAKE_PREFIX_PATH={prefix}",
+            "-DCMAKE_BUILD_TYPE=Release")
+        run(options.cmake, "--build", example)
+        said = run(example / "trace_one_ray", pack, env=clean)
+        found = re.fullmatch(r"face 0 of instance 0 at z = (\S+) mm, uv .*, normal \((\S+), (\S+), (\S+)\)\n", said)
+        expect(found, said)
+        z_mm, *normal = map(float, found.groups())
+        # the middle of the bounds is the sphere's within 0.05 mm, and the sphere's radius is 5 mm
+        expect(4.999 < z_mm <= 5.0001 and normal[2] > 0.9999, said)
+        print(said.strip())
+
+
+if __name__ == "__main__":
+    main()
