@@ -108,7 +108,7 @@ def main():
     parser.add_argument("--pictures", type=pathlib.Path, metavar="DIR", help="keep shaded pictures of the views there")
     options = parser.parse_args()
 
-    tools = {"pack": options.build / "preprocess" / "trimray-pack", "trimray": options.build / "runtime" / "trimray",
+    tools = {"pack": options.build / "bin" / "trimray-pack", "trimray": options.build / "bin" / "trimray",
              "oracle": options.build / "tests" / "occt_oracle"}
     for tool in tools.values():
         if not tool.exists():

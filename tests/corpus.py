@@ -155,7 +155,7 @@ def main():
     parser.add_argument("--keep", type=pathlib.Path, metavar="DIR", help="keep the packs there")
     options = parser.parse_args()
 
-    tools = {"pack": options.build / "preprocess" / "trimray-pack", "trimray": options.build / "runtime" / "trimray"}
+    tools = {"pack": options.build / "bin" / "trimray-pack", "trimray": options.build / "bin" / "trimray"}
     for tool in tools.values():
         if not tool.exists():
             sys.exit(f"{tool}: not built")
