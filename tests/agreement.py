@@ -47,7 +47,7 @@ def run_json(command, timeout):
     return json.loads(done.stdout)
 
 
-def check_model(path, tools, size, timeout, pictures, trim):
+def check_model(path, tools, size, timeout, pictures, trim, error_px):
     row = dict.fromkeys(COLUMNS, "")
     row["file"] = str(path)
     width, height = size
@@ -69,7 +69,7 @@ def check_model(path, tools, size, timeout, pictures, trim):
             picture = folder / f"{name}.exr"
             view = ["--eye", joined(eye), "--target", joined(target), "--up", "0,0,1", "--fov", str(FOV)]
             run_json([tools["trimray"], "render", str(pack), "-o", str(picture), "--size", f"{width}x{height}",
-                      "--device", "cpu", "--trim", trim, "--json"] + view, timeout)
+                      "--device", "cpu", "--trim", trim, "--error-px", error_px, "--json"] + view, timeout)
             if pictures:
                 pictures.mkdir(parents=True, exist_ok=True)
                 run_json([tools["trimray"], "render", str(pack), "-o", str(pictures / f"{path.name}.{name}.png"),
@@ -105,6 +105,7 @@ def main():
     parser.add_argument("--size", default="160x120", help="WxH of each of the two views")
     parser.add_argument("--timeout", type=float, default=300, help="seconds a step")
     parser.add_argument("--trim", default="exact")
+    parser.add_argument("--error-px", default="1e-4", help="the accuracy dial; its default in trimray is made for speed")
     parser.add_argument("--pictures", type=pathlib.Path, metavar="DIR", help="keep shaded pictures of the views there")
     options = parser.parse_args()
 
@@ -128,7 +129,7 @@ def main():
                 rows.append(done[str(path)])
                 continue
             try:
-                row = check_model(path, tools, size, options.timeout, options.pictures, options.trim)
+                row = check_model(path, tools, size, options.timeout, options.pictures, options.trim, options.error_px)
             except (RuntimeError, subprocess.TimeoutExpired, json.JSONDecodeError, KeyError) as failure:
                 row = dict.fromkeys(COLUMNS, "")
                 row.update(file=str(path), verdict="failed", remark=str(failure)[:300])
