@@ -10,9 +10,23 @@
 
 namespace trimray {
 
-/// Pixels [x0, x1) x [y0, y1) of the picture.
+/// Pixels [x0, x1) x [y0, y1) of the picture, at most kBlockSide a side.
 struct Block {
     uint32_t x0, y0, x1, y1;
+};
+
+constexpr uint32_t kBlockSide = 64; // pixels: candidates are collected once for so many
+constexpr uint32_t kTileSide = 16;
+
+/// The pixels of a row of tiles, on their way to the frame: whole rows go there past the caches.
+struct Strip {
+    alignas(64) float rgba[kTileSide][kBlockSide * 4];
+    alignas(64) float normal[kTileSide][kBlockSide * 3];
+    alignas(64) float uv[kTileSide][kBlockSide * 2];
+    alignas(64) float depth[kTileSide][kBlockSide];
+    alignas(64) uint32_t face[kTileSide][kBlockSide];
+    alignas(64) uint32_t instance[kTileSide][kBlockSide];
+    alignas(64) uint8_t certified[kTileSide][kBlockSide];
 };
 
 /// What a block's tracing reads and writes; one a thread, reused.
@@ -24,6 +38,7 @@ struct BlockScratch {
     // a tile's candidates, each array padded to whole packets
     std::vector<float> x0, x1, y0, y1, near_mm;
     std::vector<uint32_t> index;
+    Strip strip;
 };
 
 struct BlockJob {

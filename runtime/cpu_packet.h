@@ -18,6 +18,8 @@
 #include "shaders/shared/torus.h"
 #include "shaders/shared/trim_lookup.h"
 
+#include <hwy/cache_control.h>
+
 #include <algorithm>
 #include <limits>
 
@@ -29,7 +31,6 @@ constexpr float kDomainSlack = 4e-6f;
 constexpr float kUvOverlap = 1e-5f;
 constexpr int kNewtonSteps = 12;
 constexpr float kNewtonReach = 3.0f; // half sides of the leaf: farther from its middle the start is not this leaf's
-constexpr int kTile = 16;            // pixels
 
 class BlockTracer {
 public:
@@ -50,9 +51,10 @@ public:
             offset_x[i] = float(i % 4) + 0.5f - middle_x;
             offset_y[i] = float(i / 4) + 0.5f - middle_y;
         }
-        for (uint32_t ty = block.y0; ty < block.y1; ty += kTile) {
-            for (uint32_t tx = block.x0; tx < block.x1; tx += kTile) {
-                const Block tile{tx, ty, std::min(tx + kTile, block.x1), std::min(ty + kTile, block.y1)};
+        for (uint32_t ty = block.y0; ty < block.y1; ty += kTileSide) {
+            const uint32_t tile_y1 = std::min(ty + kTileSide, block.y1);
+            for (uint32_t tx = block.x0; tx < block.x1; tx += kTileSide) {
+                const Block tile{tx, ty, std::min(tx + kTileSide, block.x1), tile_y1};
                 choose_candidates(pixel_rect(tile));
                 for (uint32_t y = tile.y0; y < tile.y1; y += 4) {
                     for (uint32_t x = tile.x0; x < tile.x1; x += 4) {
@@ -61,11 +63,13 @@ public:
                         packet.y = load(offset_y) + real(float(y));
                         packet.alive = packet.x < float(tile.x1) - middle_x && packet.y < float(tile.y1) - middle_y;
                         const PacketHit hit = trace_packet(packet, pixel_rect({x, y, x + 4, y + 4}));
-                        write_packet(job_, packet, hit, x, y, tile, frame_, work_);
+                        write_packet(job_, packet, hit, x - block.x0, y - ty, scratch_.strip, work_);
                     }
                 }
             }
+            write_strip(scratch_.strip, block.x0, ty, block.x1 - block.x0, tile_y1 - ty, frame_);
         }
+        hwy::FlushStream();
         work_.rays += uint64_t(block.x1 - block.x0) * (block.y1 - block.y0);
     }
 

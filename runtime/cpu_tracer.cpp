@@ -16,8 +16,6 @@
 namespace trimray {
 namespace {
 
-constexpr uint32_t kBlock = 64; // pixels: candidates are collected once for so many
-
 void resize(Frame& frame, uint32_t width, uint32_t height)
 {
     const size_t pixels = size_t(width) * height;
@@ -88,11 +86,12 @@ private:
                                     options.width, options.height);
         const BlockJob job{cpu_scene_,      view, options.width, options.height, trim == TrimMode::Sdf, options.shade,
                            options.error_px};
-        const uint32_t columns = (options.width + kBlock - 1) / kBlock, rows = (options.height + kBlock - 1) / kBlock;
+        const uint32_t columns = (options.width + kBlockSide - 1) / kBlockSide,
+                       rows = (options.height + kBlockSide - 1) / kBlockSide;
         tbb::enumerable_thread_specific<WorkCounts> counts;
         const auto trace_one = [&](uint32_t i) {
-            const uint32_t x = i % columns * kBlock, y = i / columns * kBlock;
-            const Block block{x, y, std::min(x + kBlock, options.width), std::min(y + kBlock, options.height)};
+            const uint32_t x = i % columns * kBlockSide, y = i / columns * kBlockSide;
+            const Block block{x, y, std::min(x + kBlockSide, options.width), std::min(y + kBlockSide, options.height)};
             trace_block_(job, block, scratch_.local(), frame, counts.local());
         };
         if (threads == 1) {
@@ -143,9 +142,9 @@ RayHit trace_ray(const Scene& scene, const std::array<double, 3>& origin_mm, con
     const BlockJob job{cpu_scene, view, 1, 1, false, false, 0.02f};
     Frame frame;
     resize(frame, 1, 1);
-    BlockScratch scratch;
+    const auto scratch = std::make_unique<BlockScratch>();
     WorkCounts work;
-    trace_block(job, {0, 0, 1, 1}, scratch, frame, work);
+    trace_block(job, {0, 0, 1, 1}, *scratch, frame, work);
     if (frame.face[0] < 0)
         return result;
     result.hit = true;

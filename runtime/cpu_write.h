@@ -13,6 +13,7 @@
 #include "shaders/shared/shading.h"
 
 #include <algorithm>
+#include <cstring>
 #include <limits>
 
 SHARED_OPEN
@@ -92,12 +93,85 @@ FN real3 to_world(const float (&m)[3][3], real3 n)
     return out;
 }
 
+/// A packet's pixels as they lie in a frame, 4 a row.
+struct PacketPixels {
+    alignas(64) float rgba[4 * kLanes];
+    alignas(64) float normal[3 * kLanes];
+    alignas(64) float uv[2 * kLanes];
+    alignas(64) float depth[kLanes];
+    alignas(64) uint face[kLanes];
+    alignas(64) uint instance[kLanes];
+    alignas(16) uint8_t certified[kLanes];
+};
+
+constexpr PacketPixels missed_pixels()
+{
+    PacketPixels pixels{};
+    for (int i = 0; i < kLanes; ++i) {
+        pixels.depth[i] = std::numeric_limits<float>::infinity();
+        pixels.face[i] = pixels.instance[i] = ~0u;
+        pixels.certified[i] = 1;
+    }
+    return pixels;
+}
+// a constant, for code that runs before main must not need this instruction set
+constexpr PacketPixels kMissedPixels = missed_pixels();
+
+HWY_INLINE void copy_to_strip(const PacketPixels& pixels, uint32_t x, uint32_t y, Strip& strip)
+{
+    for (uint32_t row = 0; row < 4; ++row) {
+        std::memcpy(&strip.rgba[y + row][4 * x], pixels.rgba + 16 * row, 64);
+        std::memcpy(&strip.normal[y + row][3 * x], pixels.normal + 12 * row, 48);
+        std::memcpy(&strip.uv[y + row][2 * x], pixels.uv + 8 * row, 32);
+        std::memcpy(&strip.depth[y + row][x], pixels.depth + 4 * row, 16);
+        std::memcpy(&strip.face[y + row][x], pixels.face + 4 * row, 16);
+        std::memcpy(&strip.instance[y + row][x], pixels.instance + 4 * row, 16);
+        std::memcpy(&strip.certified[y + row][x], pixels.certified + 4 * row, 4);
+    }
+}
+
+/// memcpy past the caches: a frame is larger than they are, and reading its lines before writing them is half the cost.
+[[maybe_unused]] static HWY_ATTR HWY_INLINE void stream(const void* from, size_t bytes, void* to)
+{
+    using Bytes = hn::CappedTag<uint8_t, 64>;
+    constexpr size_t kLine = 64;
+    constexpr size_t kStep = hn::MaxLanes(Bytes());
+    const auto* in = static_cast<const uint8_t*>(from);
+    auto* out = static_cast<uint8_t*>(to);
+    const size_t head = std::min(bytes, (kLine - reinterpret_cast<uintptr_t>(out) % kLine) % kLine);
+    std::memcpy(out, in, head);
+    size_t at = head;
+    for (; at + kLine <= bytes; at += kLine)
+        for (size_t i = 0; i < kLine; i += kStep)
+            hn::Stream(hn::LoadU(Bytes(), in + at + i), Bytes(), out + at + i);
+    std::memcpy(out + at, in + at, bytes - at);
+}
+
+/// The strip's rows to their places: pixels [x, x + columns) of rows [y, y + rows).
+[[maybe_unused]] static HWY_ATTR void write_strip(const Strip& strip, uint32_t x, uint32_t y, uint32_t columns,
+                                                  uint32_t rows, Frame& frame)
+{
+    for (uint32_t row = 0; row < rows; ++row) {
+        const size_t pixel = size_t(y + row) * frame.width + x;
+        stream(strip.rgba[row], columns * 16, &frame.rgba[4 * pixel]);
+        stream(strip.normal[row], columns * 12, &frame.normal[3 * pixel]);
+        stream(strip.uv[row], columns * 8, &frame.uv[2 * pixel]);
+        stream(strip.depth[row], columns * 4, &frame.depth_mm[pixel]);
+        stream(strip.face[row], columns * 4, &frame.face[pixel]);
+        stream(strip.instance[row], columns * 4, &frame.instance[pixel]);
+        std::memcpy(&frame.certified[pixel], strip.certified[row], columns);
+    }
+}
+
 [[maybe_unused]] static HWY_ATTR void write_packet(const BlockJob& job, const Packet& packet, const PacketHit& hit,
-                                                   uint32_t x, uint32_t y, const Block& tile, Frame& frame,
-                                                   WorkCounts& work)
+                                                   uint32_t x, uint32_t y, Strip& strip, WorkCounts& work)
 {
     const mask hits = packet.alive && hit.best < kHuge;
     const uint hit_lanes = lane_bits(hits);
+    if (hit_lanes == 0 && !any_lane(packet.alive && hit.doubt)) {
+        copy_to_strip(kMissedPixels, x, y, strip);
+        return;
+    }
     const PacketShading shading = shade_leaves(job, hit, hit_lanes);
     const View& view = job.view;
     const scalar3 w0(float(view.w0[0]), float(view.w0[1]), float(view.w0[2]));
@@ -116,41 +190,21 @@ FN real3 to_world(const float (&m)[3][3], real3 n)
     const real3 color = shade(shading.color, normal, to_eye);
     const mask certified = shading.certified && !hit.doubt;
 
-    alignas(64) float depths[kLanes], normals[3][kLanes], colors[3][kLanes], uvs[2][kLanes];
-    alignas(64) uint faces[kLanes], instances[kLanes];
-    const uint certified_lanes = lane_bits(certified);
-    store(depth, depths);
-    store(normal.x, normals[0]);
-    store(normal.y, normals[1]);
-    store(normal.z, normals[2]);
-    store(color.x, colors[0]);
-    store(color.y, colors[1]);
-    store(color.z, colors[2]);
-    store(shading.uv_file.x, uvs[0]);
-    store(shading.uv_file.y, uvs[1]);
-    store(shading.face, faces);
-    store(hit.instance, instances);
-    const uint32_t columns = std::min(4u, tile.x1 - x), rows = std::min(4u, tile.y1 - y);
-    for (uint32_t row = 0; row < rows; ++row) {
-        for (uint32_t column = 0; column < columns; ++column) {
-            const uint32_t lane = row * 4 + column;
-            const size_t pixel = size_t(y + row) * frame.width + x + column;
-            const bool is_hit = (hit_lanes >> lane & 1u) != 0;
-            const bool is_certified = (certified_lanes >> lane & 1u) != 0;
-            frame.depth_mm[pixel] = depths[lane];
-            frame.face[pixel] = int32_t(is_hit ? faces[lane] : ~0u);
-            frame.instance[pixel] = int32_t(is_hit ? instances[lane] : ~0u);
-            frame.certified[pixel] = is_certified;
-            work.uncertified_pixels += !is_certified;
-            for (size_t c = 0; c < 3; ++c) {
-                frame.normal[3 * pixel + c] = is_hit ? normals[c][lane] : 0.0f;
-                frame.rgba[4 * pixel + c] = is_hit && job.shade ? colors[c][lane] : 0.0f;
-            }
-            frame.rgba[4 * pixel + 3] = is_hit ? 1.0f : 0.0f;
-            for (size_t c = 0; c < 2; ++c)
-                frame.uv[2 * pixel + c] = is_hit ? uvs[c][lane] : 0.0f;
-        }
-    }
+    const real none = real(0.0f);
+    const real3 shown = select(hits, job.shade ? color : real3(none, none, none), real3(none, none, none));
+    PacketPixels pixels;
+    store_interleaved(shown.x, shown.y, shown.z, select(hits, real(1.0f), none), pixels.rgba);
+    store_interleaved(select(hits, normal.x, none), select(hits, normal.y, none), select(hits, normal.z, none),
+                      pixels.normal);
+    store_interleaved(select(hits, shading.uv_file.x, none), select(hits, shading.uv_file.y, none), pixels.uv);
+    store(depth, pixels.depth);
+    store(select(hits, shading.face, integer(~0u)), pixels.face);
+    store(select(hits, hit.instance, integer(~0u)), pixels.instance);
+    const uint certified_lanes = lane_bits(certified), alive_lanes = lane_bits(packet.alive);
+    work.uncertified_pixels += uint64_t(__builtin_popcount(alive_lanes & ~certified_lanes));
+    for (uint lane = 0; lane < kLanes; ++lane)
+        pixels.certified[lane] = certified_lanes >> lane & 1u;
+    copy_to_strip(pixels, x, y, strip);
 }
 
 SHARED_CLOSE

@@ -275,6 +275,19 @@ FN void store(integer a, uint* p)
 {
     TRIMRAY_EACH_PART hn::StoreU(a.v[i], IntegerTag(), p + i * kPartLanes);
 }
+/// Lane by lane, its values beside each other.
+FN void store_interleaved(real a, real b, float* p)
+{
+    TRIMRAY_EACH_PART hn::StoreInterleaved2(a.v[i], b.v[i], RealTag(), p + 2 * i * kPartLanes);
+}
+FN void store_interleaved(real a, real b, real c, float* p)
+{
+    TRIMRAY_EACH_PART hn::StoreInterleaved3(a.v[i], b.v[i], c.v[i], RealTag(), p + 3 * i * kPartLanes);
+}
+FN void store_interleaved(real a, real b, real c, real d, float* p)
+{
+    TRIMRAY_EACH_PART hn::StoreInterleaved4(a.v[i], b.v[i], c.v[i], d.v[i], RealTag(), p + 4 * i * kPartLanes);
+}
 /// Elements base[index]; every lane's index must be in range and below 2^31.
 FN real gather(const float* base, integer index)
 {
