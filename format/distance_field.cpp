@@ -190,7 +190,7 @@ uint sdf_oversampling(uint width, uint height)
 {
     // small textures get the finest masks; large ones resolve details by themselves
     const uint texels = width * height;
-    return texels <= 64u * 64u ? 15 : texels <= 256u * 256u ? 9 : texels <= 1024u * 1024u ? 5 : 3;
+    return texels <= 32u * 32u ? 15 : texels <= 128u * 128u ? 9 : texels <= 1024u * 1024u ? 5 : 3;
 }
 
 } // namespace trimray

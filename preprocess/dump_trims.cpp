@@ -1,107 +1,181 @@
 #include "preprocess/dump_trims.h"
 
-#include <algorithm>
-#include <array>
-#include <cerrno>
-#include <cmath>
-#include <cstring>
-#include <filesystem>
+#include "format/distance_field.h"
+
 #include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
 #include <fstream>
 #include <vector>
 
 namespace trimray {
 namespace {
 
-constexpr int kLongerSide = 512;
+constexpr int kLongSide = 320; // pixels of a panel
+constexpr int kShortSideMin = 40;
+constexpr int kMargin = 6;
 
-struct Picture {
-    int width = 0, height = 0;
-    std::vector<std::array<unsigned char, 3>> pixels;
+struct Rgb {
+    uint8_t r = 255, g = 255, b = 255;
+};
 
-    void set(double u, double v, std::array<unsigned char, 3> color)
+/// A picture with row 0 at the bottom until it is written.
+class Picture {
+public:
+    Picture(int width, int height) : width_(width), height_(height), pixels_(static_cast<size_t>(width) * height) {}
+
+    void set(int x, int y, Rgb color)
     {
-        const int x = std::clamp(static_cast<int>(u * width), 0, width - 1);
-        const int y = std::clamp(static_cast<int>((1 - v) * height), 0, height - 1); // v grows upwards
-        pixels[static_cast<size_t>(y) * width + x] = color;
+        if (x >= 0 && y >= 0 && x < width_ && y < height_)
+            pixels_[static_cast<size_t>(y) * width_ + x] = color;
+    }
+
+    bool write(const std::filesystem::path& path) const
+    {
+        std::ofstream file(path, std::ios::binary);
+        file << "P6\n" << width_ << " " << height_ << "\n255\n";
+        for (int y = height_ - 1; y >= 0; --y)
+            file.write(reinterpret_cast<const char*>(pixels_.data() + static_cast<size_t>(y) * width_),
+                       3 * static_cast<std::streamsize>(width_));
+        return file.good();
+    }
+
+private:
+    int width_, height_;
+    std::vector<Rgb> pixels_;
+};
+
+/// One panel's place in the picture.
+struct Panel {
+    Picture& picture;
+    int x0, width, height;
+
+    template <class Color>
+    void fill(Color color) const
+    {
+        for (int y = 0; y < height; ++y)
+            for (int x = 0; x < width; ++x)
+                picture.set(x0 + x, kMargin + y, color((x + 0.5) / width, (y + 0.5) / height));
+    }
+
+    void draw(const std::vector<MonotonePiece>& pieces) const
+    {
+        for (const MonotonePiece& piece : pieces) {
+            const double length = std::hypot((piece.u[3] - piece.u[0]) * width, (piece.v[3] - piece.v[0]) * height);
+            const int steps = 2 + static_cast<int>(4 * length);
+            for (int i = 0; i <= steps; ++i) {
+                const double t = static_cast<double>(i) / steps;
+                picture.set(x0 + static_cast<int>(std::lround(bezier3(piece.u, t) * (width - 1))),
+                            kMargin + static_cast<int>(std::lround(bezier3(piece.v, t) * (height - 1))), {0, 0, 0});
+            }
+            for (const int end : {0, 3}) // where pieces meet
+                for (int d = -1; d <= 1; ++d) {
+                    const int x = x0 + static_cast<int>(std::lround(piece.u[end] * (width - 1)));
+                    const int y = kMargin + static_cast<int>(std::lround(piece.v[end] * (height - 1)));
+                    picture.set(x + d, y, {200, 0, 0});
+                    picture.set(x, y + d, {200, 0, 0});
+                }
+        }
     }
 };
 
-/// Stored byte of the texel that holds (u, v); 128 is the border.
-int texel(const PackImage& image, const FaceRecord& face, double u, double v)
+Rgb cell_color(const PackImage& image, const FaceRecord& face, double u, double v)
+{
+    const uint columns = face.grid & 0xffffu, rows = face.grid >> 16;
+    const uint column = std::min(static_cast<uint>(u * columns), columns - 1);
+    const uint row = std::min(static_cast<uint>(v * rows), rows - 1);
+    const uint cell = image.cells[face.first_cell + row * columns + column];
+    if ((cell & 3u) == kCellIn)
+        return {250, 250, 250};
+    if ((cell & 3u) == kCellOut)
+        return {170, 170, 170};
+    uint entries = 1;
+    for (const CellEntry* e = image.cell_entries.data() + face.first_entry + (cell >> 2); (e->word & kEntryLast) == 0;
+         ++e)
+        ++entries;
+    const uint8_t shade = static_cast<uint8_t>(230 - std::min(entries, 8u) * 20);
+    return (row + column) % 2 == 0 ? Rgb{shade, 240, shade} : Rgb{shade, 225, shade};
+}
+
+Rgb distance_color(const PackImage& image, const FaceRecord& face, double u, double v)
 {
     const int width = static_cast<int>(face.sdf_size & 0xffffu), height = static_cast<int>(face.sdf_size >> 16);
-    const int i = std::clamp(static_cast<int>(u * width), 0, width - 1);
-    const int j = std::clamp(static_cast<int>(v * height), 0, height - 1);
-    const uint words_a_row = (static_cast<uint>(width) + 3) / 4;
-    const uint word =
-        image.sdf_words[face.sdf_first_word + static_cast<uint>(j) * words_a_row + static_cast<uint>(i) / 4];
-    return static_cast<int>(word >> (8 * (i % 4)) & 0xffu);
+    const auto texel = [&](int x, int y) {
+        x = std::clamp(x, 0, width - 1);
+        y = std::clamp(y, 0, height - 1);
+        const uint word = image.sdf_words[face.sdf_first_word + static_cast<uint>(y * ((width + 3) / 4) + x / 4)];
+        return (static_cast<double>(word >> (8 * (x % 4)) & 0xffu) - 128) * kSdfTexelQuantum;
+    };
+    const double x = u * width - 0.5, y = v * height - 0.5;
+    const int i = static_cast<int>(std::floor(x)), j = static_cast<int>(std::floor(y));
+    const double s = x - i, t = y - j;
+    const double d = (1 - t) * ((1 - s) * texel(i, j) + s * texel(i + 1, j)) +
+                     t * ((1 - s) * texel(i, j + 1) + s * texel(i + 1, j + 1));
+    const double dim = std::abs(d) <= face.sdf_band_texels ? 0.75 : 1.0;
+    const double level = dim * (255 - 40 * std::min(std::abs(d), 4.0)), base = dim * 255;
+    const auto byte = [](double value) { return static_cast<uint8_t>(std::clamp(value, 0.0, 255.0)); };
+    return d > 0 ? Rgb{byte(base), byte(level), byte(0.5 * level)} : Rgb{byte(0.5 * level), byte(level), byte(base)};
 }
 
-void draw_distances(const PackImage& image, const FaceRecord& face, Picture& picture)
+bool dump_face(const PackImage& image, const FaceRecord& face, const std::filesystem::path& path)
 {
-    for (int y = 0; y < picture.height; ++y)
-        for (int x = 0; x < picture.width; ++x) {
-            const double u = (x + 0.5) / picture.width, v = 1 - (y + 0.5) / picture.height;
-            std::array<unsigned char, 3> color{225, 225, 225};
-            if (face.sdf_size != 0) {
-                const int stored = texel(image, face, u, v);
-                const auto shade = static_cast<unsigned char>(255 - std::min(120, std::abs(stored - 128)));
-                color = stored >= 128 ? std::array<unsigned char, 3>{90, 130, shade}
-                                      : std::array<unsigned char, 3>{shade, shade, shade};
-            }
-            picture.pixels[static_cast<size_t>(y) * picture.width + x] = color;
-        }
-}
+    std::vector<MonotonePiece> pieces;
+    for (uint i = 0; i < face.piece_count; ++i)
+        pieces.push_back(
+            load_piece(image.trim_points.data(), face.first_point, image.trim_pieces[face.first_piece + i]));
+    const double u_mm = std::max(face.extent_mm[0], 1e-30f), v_mm = std::max(face.extent_mm[1], 1e-30f);
+    const double scale = kLongSide / std::max(u_mm, v_mm);
+    const int width = std::max(kShortSideMin, static_cast<int>(std::lround(scale * u_mm)));
+    const int height = std::max(kShortSideMin, static_cast<int>(std::lround(scale * v_mm)));
+    const int panels = 1 + 1 + (face.sdf_size != 0 ? 1 : 0);
+    Picture picture(panels * (width + kMargin) + kMargin, height + 2 * kMargin);
 
-void draw_pieces(const PackImage& image, const FaceRecord& face, Picture& picture)
-{
-    for (uint k = 0; k < face.piece_count; ++k) {
-        const uint word = image.trim_pieces[face.first_piece + k];
-        const float* p = &image.trim_points[2 * (face.first_point + (word >> 2))];
-        const bool cubic = (word & kPieceCubic) != 0;
-        const int steps = 2 * kLongerSide;
-        for (int i = 0; i <= steps; ++i) {
-            const double t = static_cast<double>(i) / steps, s = 1 - t;
-            const double b[4] = {s * s * s, 3 * s * s * t, 3 * s * t * t, t * t * t};
-            double uv[2];
-            for (int axis = 0; axis < 2; ++axis)
-                uv[axis] = cubic ? b[0] * p[axis] + b[1] * p[2 + axis] + b[2] * p[4 + axis] + b[3] * p[6 + axis]
-                                 : s * p[axis] + t * p[2 + axis];
-            picture.set(uv[0], uv[1], {200, 30, 30});
-        }
+    const Panel cells{picture, kMargin, width, height};
+    if (face.grid != 0)
+        cells.fill([&](double u, double v) { return cell_color(image, face, u, v); });
+    cells.draw(pieces);
+
+    const TrimMask inside = scan_convert(pieces, static_cast<uint>(width), static_cast<uint>(height));
+    const Panel mask{picture, 2 * kMargin + width, width, height};
+    mask.fill([&](double u, double v) {
+        const bool in = inside.inside[static_cast<size_t>(v * height) * width + static_cast<size_t>(u * width)] != 0;
+        return in ? Rgb{255, 255, 255} : Rgb{60, 60, 60};
+    });
+    if (face.sdf_size != 0) {
+        const Panel distance{picture, 3 * kMargin + 2 * width, width, height};
+        distance.fill([&](double u, double v) { return distance_color(image, face, u, v); });
+        distance.draw(pieces);
     }
+    return picture.write(path);
 }
 
 } // namespace
 
-Status dump_trims(const PackImage& image, const std::string& folder)
+Status dump_trims(const PackImage& image, const std::string& directory)
 {
-    std::error_code failed;
-    std::filesystem::create_directories(folder, failed);
-    if (failed)
-        return Error{ErrorCode::FileNotWritable, folder, failed.message()};
-    for (size_t id = 0; id < image.faces.size(); ++id) {
-        const FaceRecord& face = image.faces[id];
-        if (face.piece_count == 0)
-            continue;
-        const double aspect = std::clamp<double>(face.extent_mm[1] / std::max(face.extent_mm[0], 1e-30f), 1.0 / 8, 8.0);
-        Picture picture;
-        picture.width = std::max(1, static_cast<int>(kLongerSide * std::min(1.0, 1 / aspect)));
-        picture.height = std::max(1, static_cast<int>(kLongerSide * std::min(1.0, aspect)));
-        picture.pixels.resize(static_cast<size_t>(picture.width) * picture.height);
-        draw_distances(image, face, picture);
-        draw_pieces(image, face, picture);
-        const std::string path = (std::filesystem::path(folder) / fmt::format("face_{}.ppm", id)).string();
-        std::ofstream file(path, std::ios::binary);
-        file << "P6\n" << picture.width << ' ' << picture.height << "\n255\n";
-        file.write(reinterpret_cast<const char*>(picture.pixels.data()),
-                   static_cast<std::streamsize>(picture.pixels.size() * 3));
-        file.close();
-        if (!file)
-            return Error{ErrorCode::FileNotWritable, path, std::strerror(errno)};
+    const std::filesystem::path folder(directory);
+    std::error_code error;
+    std::filesystem::create_directories(folder, error);
+    std::ofstream index(folder / "index.txt");
+    index
+        << "face part name pieces loops grid_columns grid_rows entries sdf_width sdf_height band_texels natural open\n";
+    for (size_t f = 0; f < image.faces.size(); ++f) {
+        const FaceRecord& face = image.faces[f];
+        index << fmt::format("{} {} \"{}\" {} {} {} {} {} {} {} {:.3f} {} {}\n", f, face.part,
+                             image.strings.strings[face.name], face.piece_count, face.loop_count, face.grid & 0xffffu,
+                             face.grid >> 16, face.entry_count, face.sdf_size & 0xffffu, face.sdf_size >> 16,
+                             face.sdf_band_texels, (face.flags & kFaceNaturalBorder) != 0 ? 1 : 0,
+                             (face.flags & kFaceOpenLoop) != 0 ? 1 : 0);
+        const std::filesystem::path path = folder / fmt::format("face_{:06}.ppm", f);
+        if (face.piece_count != 0 && !dump_face(image, face, path))
+            return Error{ErrorCode::FileNotWritable, path.string(), "the picture could not be written"};
     }
+    index.flush();
+    if (!index.good())
+        return Error{ErrorCode::FileNotWritable, (folder / "index.txt").string(),
+                     "the list of faces could not be written"};
     return Done{};
 }
 

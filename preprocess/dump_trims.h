@@ -1,4 +1,4 @@
-// Pictures of the trims, to see what can go wrong: a face's loops drawn over its distance texture.
+// Pictures of what the trims of each face became, for eyes: loops, mask, distance field and cells side by side.
 #pragma once
 
 #include "format/pack_image.h"
@@ -8,8 +8,10 @@
 
 namespace trimray {
 
-/// Writes `face_<id>.ppm` into `folder` (made if missing) for every face with loops: inside blue, outside grey, darker
-/// with the stored distance; the loops' pieces in red. Fails: FileNotWritable.
-Status dump_trims(const PackImage& image, const std::string& folder);
+/// Writes `directory`/face_NNNNNN.ppm for every trimmed face, and index.txt with a line of numbers for each face.
+/// Panels from left to right, v upwards: the loops over the cells' classes (white in, grey out, tinted mixed, more
+/// entries darker), the mask, the distance field (warm in, cold out, the band dimmed), each with the loops drawn in
+/// black. The folder is made if need be. Fails: FileNotWritable.
+Status dump_trims(const PackImage& image, const std::string& directory);
 
 } // namespace trimray

@@ -160,8 +160,12 @@ CurvePiece line_piece(Vec2d a, Vec2d b)
     return {{a, mix(1 / 3.0), mix(2 / 3.0), b}, false};
 }
 
-/// Joins the end of `before` with the start of `after`, which is `offset` (whole periods) away in uv. Returns a line if
-/// the gap needs one.
+// Neighbouring pcurves that miss each other by up to this many tolerances are moved together by half the gap each: as
+// far as the file contradicts itself, and no farther. What they move counts as deviation.
+constexpr double kJoinTolerances = 10;
+
+/// Joins the end of `before` with the start of `after`, which is `offset` (whole periods) away in uv. Returns true, and
+/// the line, if the gap needs one.
 bool join(CurvePiece& before, CurvePiece& after, Vec2d offset, const CadFace& face, const Joints& joints,
           const TrimMetric& metric, ChainReport& report, CurvePiece& filler)
 {
@@ -169,17 +173,20 @@ bool join(CurvePiece& before, CurvePiece& after, Vec2d offset, const CadFace& fa
     if (a.x == b.x && a.y == b.y)
         return false;
     const double flat_mm = std::hypot((a.x - b.x) * metric.mm_per_uv.x, (a.y - b.y) * metric.mm_per_uv.y);
-    report.largest_gap_mm = std::max(report.largest_gap_mm, joints.distance(a, b));
-    if (flat_mm > metric.tolerance_mm) {
+    const double gap_mm = joints.distance(a, b);
+    report.largest_gap_mm = std::max(report.largest_gap_mm, gap_mm);
+    if (flat_mm > kJoinTolerances * metric.tolerance_mm) {
         filler = line_piece(a, b);
-        if (joints.distance(a, b) > std::max(face.tolerance_mm, metric.tolerance_mm))
+        if (gap_mm > std::max(face.tolerance_mm, kJoinTolerances * metric.tolerance_mm))
             report.had_open_loop = true;
         return true;
     }
-    // the end values are shared: the start moves to the end, or a line that may have no width would be left
-    const Vec2d middle{0.5 * (a.x + b.x), 0.5 * (a.y + b.y)};
-    before.p[3] = middle;
-    after.p[0] = {middle.x - offset.x, middle.y - offset.y};
+    report.largest_move_mm = std::max(report.largest_move_mm, 0.5 * flat_mm);
+    const Vec2d half{0.5 * (b.x - a.x), 0.5 * (b.y - a.y)};
+    before.p[2] = {before.p[2].x + half.x, before.p[2].y + half.y};
+    before.p[3] = {a.x + half.x, a.y + half.y};
+    after.p[0] = {before.p[3].x - offset.x, before.p[3].y - offset.y};
+    after.p[1] = {after.p[1].x - half.x, after.p[1].y - half.y};
     order_points(before);
     order_points(after);
     return false;

@@ -25,17 +25,18 @@ struct TrimChain {
 struct ChainReport {
     bool had_open_loop = false;
     double largest_gap_mm = 0;
-    double largest_deviation_mm = 0;
-    std::string failure; // not empty: the chains cannot be used, and why
+    double largest_deviation_mm = 0; // of the fit
+    double largest_move_mm = 0;      // of an end to meet its neighbour
+    std::string failure;             // not empty: the chains cannot be used, and why
 };
 
 /// The metric of a surface over a rectangle of its parameters.
 TrimMetric trim_metric(const CadSurface& surface, const Rect2d& domain, double relative_tolerance);
 
 /// Fits the pcurves of a face's loops and joins them.
-/// Ends within the tolerance are moved together; a wider gap is closed by a line, and counts as open when it is wider
-/// on the surface than the face's own tolerance (a gap along a pole is no gap). Uses follow each other in the order
-/// given where they meet; otherwise the nearest end goes next, turned around if need be.
+/// Ends that nearly meet are moved together; a wider gap is closed by a line, and counts as open when it is wider on
+/// the surface than the face's own tolerance (a gap along a pole is no gap). Uses follow each other in the order given
+/// where they meet; otherwise the nearest end goes next, turned around if need be.
 std::vector<TrimChain> build_chains(const CadFace& face, double relative_tolerance, TrimMetric& metric,
                                     ChainReport& report);
 

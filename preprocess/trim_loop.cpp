@@ -203,7 +203,8 @@ Result<TrimLoops> build_trim_loops(const CadFace& face, const TrimOptions& optio
 
     loops.had_open_loop = report.had_open_loop;
     loops.largest_gap = report.largest_gap_mm / metric.longer_side_mm;
-    loops.largest_deviation = (report.largest_deviation_mm + merged_mm) / metric.longer_side_mm;
+    loops.largest_deviation =
+        (report.largest_deviation_mm + report.largest_move_mm + merged_mm) / metric.longer_side_mm;
     if (is_natural(pieces)) {
         loops.natural_border = true;
         loops.points.clear();

@@ -25,8 +25,9 @@ inline double trimmed_area(const CadSurface& surface, const TrimLoops& loops)
         heights.push_back(pieces.back().v[0]);
     }
     const bool simple = surface.kind == kKindPlane || surface.kind == kKindCylinder || surface.kind == kKindCone;
-    for (int i = 1; i < (pieces.size() < 200 ? 8 : 2); ++i)
-        heights.push_back(i / 8.0);
+    const int rows = pieces.size() > 200 ? 2 : simple ? 64 : 8;
+    for (int i = 1; i < rows; ++i)
+        heights.push_back(static_cast<double>(i) / rows);
     if (surface.kind == kKindBezier)
         for (const double k : surface.spline.knots_v)
             if (k > loops.domain.lo.y && k < loops.domain.hi.y)

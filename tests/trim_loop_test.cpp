@@ -3,6 +3,7 @@
 
 #include "tests/trim_shapes.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 namespace trimray {
@@ -201,6 +202,262 @@ TEST(trim_loop, a_hole_across_a_cylinders_seam_has_the_same_area_at_sixteen_rota
         ASSERT_TRUE(seamless.ok());
         EXPECT_NEAR(area_of(*seamless), 3 * p - M_PI, 2e-4) << i;
     }
+}
+
+/// A clamped cubic B-spline of `segments` segments through samples of a function (Hermite, C1: double knots).
+template <class Point, class Slope>
+SplineCurve2d many_segments(int segments, Point point, Slope slope, double noise = 0)
+{
+    std::mt19937 rng(11);
+    std::uniform_real_distribution<double> uniform(-noise, noise);
+    SplineCurve2d curve{3, false, {0, 0, 0, 0}, {}};
+    const double h = 1.0 / segments;
+    for (int i = 0; i <= segments; ++i) {
+        const double t = i * h;
+        Vec2d p = point(t);
+        const Vec2d d = slope(t);
+        p.x += i > 0 && i < segments ? uniform(rng) : 0;
+        p.y += i > 0 && i < segments ? uniform(rng) : 0;
+        if (i > 0)
+            curve.control_points.push_back({p.x - h / 3 * d.x, p.y - h / 3 * d.y, 1});
+        if (i == 0 || i == segments)
+            curve.control_points.push_back({p.x, p.y, 1});
+        if (i < segments)
+            curve.control_points.push_back({p.x + h / 3 * d.x, p.y + h / 3 * d.y, 1});
+        if (i > 0)
+            curve.knots.insert(curve.knots.end(), i < segments ? 2 : 4, t);
+    }
+    return curve;
+}
+
+TEST(trim_loop, a_curve_of_a_hundred_thousand_segments_becomes_few_pieces_within_the_tolerance)
+{
+    for (const double noise : {0.0, 1e-7}) {
+        const auto wave = [](double t) { return Vec2d{10 * t, std::sin(9 * t)}; };
+        const auto slope = [](double t) { return Vec2d{10, 9 * std::cos(9 * t)}; };
+        CadLoop loop{use_of(many_segments(100000, wave, slope, noise))};
+        for (const CadEdgeUse& use : polygon_loop({wave(1), {10, 5}, {0, 5}, {0, 0}}))
+            loop.push_back(use);
+        loop.pop_back();
+        const auto loops = build_trim_loops(plane_face({loop}), {});
+        ASSERT_TRUE(loops.ok());
+        expect_sound(*loops);
+        EXPECT_LE(loops->pieces.size(), 40u) << "noise " << noise;
+        EXPECT_LE(loops->largest_deviation, 1e-6);
+        // the area under the wave is known, and the curve itself lies on the pieces
+        const double under = 10 * (1 - std::cos(9.0)) / 9;
+        EXPECT_NEAR(area_of(*loops), 50 - under, 1e-3);
+        const std::vector<MonotonePiece> pieces = pieces_of(*loops);
+        const Vec2d lo = loops->domain.lo, size{loops->domain.hi.x - lo.x, loops->domain.hi.y - lo.y};
+        for (int i = 0; i <= 2000; ++i) {
+            const Vec2d p = wave(i / 2000.0);
+            EXPECT_LE(exact_distance(pieces, (p.x - lo.x) / size.x, (p.y - lo.y) / size.y, size.x, size.y), 1.3e-5)
+                << "at " << i;
+        }
+    }
+}
+
+TEST(trim_loop, collinear_segments_become_one_line)
+{
+    const auto line = [](double t) { return Vec2d{8 * t, 3 * t}; };
+    const auto slope = [](double) { return Vec2d{8, 3}; };
+    CadLoop loop{use_of(many_segments(50000, line, slope, 1e-9))};
+    loop.push_back(use_of(line_curve({8, 3}, {6, 5})));
+    loop.push_back(use_of(line_curve({6, 5}, {4, 7})));
+    loop.push_back(use_of(line_curve({4, 7}, {0, 0})));
+    const auto loops = build_trim_loops(plane_face({loop}), {});
+    ASSERT_TRUE(loops.ok());
+    expect_sound(*loops);
+    EXPECT_EQ(loops->pieces.size(), 3u);
+}
+
+TEST(trim_loop, circles_of_every_size_stay_within_the_tolerance)
+{
+    for (const double radius : {4.9, 1.0, 0.1, 0.01, 0.001}) {
+        const auto loops = build_trim_loops(
+            plane_face({polygon_loop({{0, 0}, {10, 0}, {10, 10}, {0, 10}}), {use_of(circle_curve({5, 5}, radius))}}),
+            {});
+        ASSERT_TRUE(loops.ok());
+        expect_sound(*loops);
+        for (const MonotonePiece& p : pieces_of(*loops)) {
+            if (!p.cubic)
+                continue;
+            for (int i = 0; i <= 50; ++i) {
+                const double r = std::hypot(bezier3(p.u, i / 50.0) - 0.5, bezier3(p.v, i / 50.0) - 0.5);
+                EXPECT_NEAR(r, radius / 10, 1.2e-6) << "radius " << radius; // and the rounding of floats
+            }
+        }
+    }
+}
+
+TEST(trim_loop, uses_out_of_order_and_turned_around_are_put_right)
+{
+    std::mt19937 rng(2);
+    const std::vector<Vec2d> corners = {{0, 0}, {4, 1}, {7, 0}, {9, 3}, {6, 6}, {5, 3}, {2, 5}, {-1, 3}};
+    const double area = area_of(*build_trim_loops(plane_face({polygon_loop(corners)}), {}));
+    for (int i = 0; i < 50; ++i) {
+        CadLoop loop = polygon_loop(corners);
+        std::shuffle(loop.begin(), loop.end(), rng);
+        for (CadEdgeUse& use : loop)
+            use.reversed = rng() % 2 == 0;
+        const auto loops = build_trim_loops(plane_face({loop}), {});
+        ASSERT_TRUE(loops.ok());
+        expect_sound(*loops);
+        EXPECT_FALSE(loops->had_open_loop);
+        EXPECT_NEAR(area_of(*loops), area, 1e-6);
+    }
+}
+
+TEST(trim_loop, gaps_are_closed_and_reported)
+{
+    for (const double gap : {1e-12, 1e-8, 1e-6, 9e-6, 1e-4, 1e-3, 1e-2}) {
+        CadLoop loop = polygon_loop({{0, 0}, {1, 0}, {1, 1}, {0, 1}});
+        loop[1] = use_of(line_curve({1, gap}, {1 - gap, 1}));
+        const auto loops = build_trim_loops(plane_face({loop}), {});
+        ASSERT_TRUE(loops.ok());
+        expect_sound(*loops);
+        EXPECT_NEAR(loops->largest_gap, gap, 1e-3 * gap + 1e-15);
+        EXPECT_EQ(loops->had_open_loop, gap > 1e-5) << gap;
+        EXPECT_NEAR(area_of(*loops), 1, gap + 1e-6);
+    }
+}
+
+CadFace sphere_face(std::vector<CadLoop> loops)
+{
+    CadFace face = plane_face(std::move(loops));
+    face.surface.kind = kKindSphere;
+    face.surface.radius = 3;
+    face.surface.period_u = 2 * M_PI;
+    face.surface.natural_bounds = {{0, -M_PI / 2}, {2 * M_PI, M_PI / 2}};
+    return face;
+}
+
+TEST(trim_loop, a_circle_around_a_sphere_bounds_the_cap_on_its_left)
+{
+    const double p = 2 * M_PI, pole = M_PI / 2;
+    const auto north = build_trim_loops(sphere_face({{use_of(line_curve({0, 0.3}, {p, 0.3}))}}), {});
+    ASSERT_TRUE(north.ok());
+    EXPECT_TRUE(north->natural_border);
+    EXPECT_NEAR(area_of(*north), p * (pole - 0.3), 1e-9);
+    const auto south = build_trim_loops(sphere_face({{use_of(line_curve({p, 0.3}, {0, 0.3}))}}), {});
+    ASSERT_TRUE(south.ok());
+    EXPECT_NEAR(area_of(*south), p * (pole + 0.3), 1e-9);
+}
+
+TEST(trim_loop, a_sphere_of_seams_and_poles_is_its_domain_with_or_without_the_poles_edges)
+{
+    const double p = 2 * M_PI, h = M_PI / 2;
+    CadLoop loop = polygon_loop({{p, -h}, {p, h}, {0, h}, {0, -h}});
+    loop[0].seam = loop[2].seam = true;
+    loop[1].degenerate = loop[3].degenerate = true;
+    const auto whole = build_trim_loops(sphere_face({loop}), {});
+    ASSERT_TRUE(whole.ok());
+    EXPECT_TRUE(whole->natural_border);
+    const auto bare = build_trim_loops(sphere_face({{loop[0], loop[2]}}), {});
+    ASSERT_TRUE(bare.ok());
+    EXPECT_TRUE(bare->natural_border);
+    EXPECT_FALSE(bare->had_open_loop); // a pole is one point
+    EXPECT_NEAR(area_of(*bare), p * 2 * h, 1e-9);
+}
+
+TEST(trim_loop, a_hole_alone_on_a_closed_surface_leaves_the_rest_of_it)
+{
+    const double whole = 2 * M_PI * M_PI;
+    for (const double at : {0.0, 3.0}) { // across the seam, and not
+        const auto loops = build_trim_loops(sphere_face({{use_of(circle_curve({at, 0.1}, 0.5, true))}}), {});
+        ASSERT_TRUE(loops.ok());
+        expect_sound(*loops);
+        EXPECT_NEAR(area_of(*loops), whole - M_PI * 0.25, 1e-4);
+        const auto patch = build_trim_loops(sphere_face({{use_of(circle_curve({at, 0.1}, 0.5))}}), {});
+        ASSERT_TRUE(patch.ok());
+        EXPECT_NEAR(area_of(*patch), M_PI * 0.25, 1e-4);
+    }
+}
+
+TEST(trim_loop, a_band_around_a_torus_lies_on_the_side_its_circles_say)
+{
+    const double p = 2 * M_PI;
+    CadFace face = plane_face({{use_of(line_curve({0, 1}, {p, 1}))}, {use_of(line_curve({p, 2.5}, {0, 2.5}))}});
+    face.surface.kind = kKindTorus;
+    face.surface.radius = 5;
+    face.surface.minor_radius = 1;
+    face.surface.period_u = face.surface.period_v = p;
+    face.surface.natural_bounds = {{0, 0}, {p, p}};
+    const auto inner = build_trim_loops(face, {});
+    ASSERT_TRUE(inner.ok());
+    EXPECT_NEAR(area_of(*inner), p * 1.5, 1e-9);
+    for (CadLoop& loop : face.loops)
+        loop[0].reversed = true;
+    const auto outer = build_trim_loops(face, {});
+    ASSERT_TRUE(outer.ok());
+    EXPECT_NEAR(area_of(*outer), p * (p - 1.5), 1e-9);
+    // around the small way
+    face.loops = {{use_of(line_curve({1, 0}, {1, p}))}, {use_of(line_curve({2, p}, {2, 0}))}};
+    const auto other = build_trim_loops(face, {});
+    ASSERT_TRUE(other.ok());
+    EXPECT_NEAR(area_of(*other), p * (p - 1), 1e-9); // left of the upward circle at u = 1, right of u = 2
+}
+
+TEST(trim_loop, a_thread_of_many_turns_is_wrapped_into_one)
+{
+    const double p = 2 * M_PI, turns = 5, pitch = 1, width = 0.4;
+    const auto loops = build_trim_loops(
+        cylinder_face(
+            2, {polygon_loop({{0, 0}, {turns * p, turns * pitch}, {turns * p, turns * pitch + width}, {0, width}})}),
+        {});
+    ASSERT_TRUE(loops.ok());
+    expect_sound(*loops);
+    EXPECT_NEAR(loops->domain.hi.x - loops->domain.lo.x, p, 1e-9);
+    EXPECT_NEAR(area_of(*loops), turns * p * width, 1e-3);
+}
+
+TEST(trim_loop, a_loop_that_crosses_itself_is_filled_by_even_odd)
+{
+    const auto eight = build_trim_loops(plane_face({polygon_loop({{0, 0}, {2, 2}, {2, 0}, {0, 2}})}), {});
+    ASSERT_TRUE(eight.ok());
+    EXPECT_NEAR(area_of(*eight), 2, 1e-6);
+}
+
+TEST(trim_loop, every_orientation_of_nested_loops_is_the_same_region)
+{
+    for (int mask = 0; mask < 8; ++mask) {
+        std::vector<CadLoop> loops = {polygon_loop({{0, 0}, {10, 0}, {10, 10}, {0, 10}}),
+                                      {use_of(circle_curve({5, 5}, 4))},
+                                      {use_of(circle_curve({5, 5}, 2))}};
+        for (int i = 0; i < 3; ++i)
+            if ((mask >> i & 1) != 0) {
+                std::reverse(loops[static_cast<size_t>(i)].begin(), loops[static_cast<size_t>(i)].end());
+                for (CadEdgeUse& use : loops[static_cast<size_t>(i)])
+                    use.reversed = !use.reversed;
+            }
+        const auto built = build_trim_loops(plane_face(loops), {});
+        ASSERT_TRUE(built.ok());
+        expect_sound(*built);
+        EXPECT_NEAR(area_of(*built), 100 - 12 * M_PI, 1e-3);
+    }
+}
+
+TEST(trim_loop, what_cannot_bound_a_face_is_refused_with_a_reason)
+{
+    const auto detail = [](const CadFace& face) {
+        const auto loops = build_trim_loops(face, {});
+        EXPECT_FALSE(loops.ok());
+        if (!loops.ok()) {
+            EXPECT_EQ(loops.error().code, ErrorCode::InvalidTrim);
+        }
+        return loops.ok() ? std::string() : loops.error().detail;
+    };
+    EXPECT_THAT(detail(plane_face({})), testing::HasSubstr("natural bounds"));
+    EXPECT_THAT(detail(plane_face({polygon_loop({{0, 0}, {1, 1}})})), testing::HasSubstr("no area"));
+    EXPECT_THAT(detail(plane_face({polygon_loop({{0, 0}, {1, 0}, {2, 0}})})), testing::HasSubstr("no area"));
+    EXPECT_THAT(detail(plane_face({polygon_loop({{0, 0}, {1, NAN}, {1, 1}})})), testing::HasSubstr("not finite"));
+    EXPECT_THAT(detail(plane_face({polygon_loop({{0, 0}, {1, INFINITY}, {1, 1}})})), testing::HasSubstr("not finite"));
+    CadFace bad = plane_face({polygon_loop({{0, 0}, {1, 0}, {1, 1}})});
+    bad.loops[0][1].pcurve.knots.pop_back();
+    EXPECT_THAT(detail(bad), testing::HasSubstr("knots"));
+    EXPECT_THAT(detail(cylinder_face(1, {{use_of(line_curve({0, 0}, {2 * M_PI, 0}))}})), testing::HasSubstr("no area"));
+    EXPECT_THAT(detail(cylinder_face(1, {{use_of(line_curve({0, 0}, {4 * M_PI, 1}))}})),
+                testing::HasSubstr("more than once"));
 }
 
 } // namespace
