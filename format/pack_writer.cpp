@@ -58,8 +58,8 @@ Bytes compress_frame(ByteSpan content, int level)
 /// Small sections take the strongest level: the time cannot be noticed, and in small packs the bytes can.
 int level_for(size_t bytes, int level)
 {
-    constexpr size_t kSmall = 256u << 10;
-    return bytes <= kSmall ? std::max(level, ZSTD_maxCLevel()) : level;
+    constexpr size_t kSmall = 128u << 10;
+    return bytes <= kSmall ? std::max(level, 19) : level;
 }
 
 constexpr int kTrialLevel = 3; // its ranking is that of higher levels nearly always, at a tenth of the time

@@ -86,8 +86,8 @@ int run(const std::vector<std::string>& arguments)
     int exit_code = kExitOk;
     for (const ExternalCommand& command : external_commands())
         register_external(app, command);
-    for (const auto register_command :
-         {register_render, register_info, register_validate, register_thumbnail, register_preview, register_version})
+    for (const auto register_command : {register_render, register_info, register_validate, register_thumbnail,
+                                        register_export, register_preview, register_version})
         register_command(app, exit_code);
 
     if (arguments.empty()) {
