@@ -137,6 +137,8 @@ int run_render(const RenderArguments& arguments)
     if (!scene.ok())
         return report_error(scene.error());
     const PackImage& image = (*scene)->pack.image;
+    if (const Status held = check_trim(image, trim_mode(arguments.trim)); !held.ok())
+        return report_error(held.error());
     const Result<Camera> camera = camera_of(arguments.view, image, size->width, size->height);
     if (!camera.ok())
         return report_error(camera.error());

@@ -26,7 +26,7 @@ Result<std::array<double, 3>> parse_vector(const std::string& option, const std:
 
 const Choice& trim_choice()
 {
-    static const Choice choice{"--trim", {"auto", "exact", "hybrid", "sdf", "kd"}, {"auto", "exact", "sdf"}};
+    static const Choice choice{"--trim", {"auto", "exact", "hybrid", "sdf", "kd"}, {"auto", "exact", "hybrid", "sdf"}};
     return choice;
 }
 
@@ -65,8 +65,25 @@ TrimMode trim_mode(const std::string& name)
         return TrimMode::Exact;
     if (name == "sdf")
         return TrimMode::Sdf;
+    if (name == "hybrid")
+        return TrimMode::Hybrid;
     assert(name == "auto" && "checked against trim_choice()");
     return TrimMode::Auto;
+}
+
+Status check_trim(const PackImage& image, TrimMode mode)
+{
+    if (mode != TrimMode::Sdf && mode != TrimMode::Hybrid)
+        return Done{};
+    const auto bare = std::count_if(image.faces.begin(), image.faces.end(), [](const FaceRecord& face) {
+        return (face.flags & kFaceNaturalBorder) == 0 && face.sdf_size == 0;
+    });
+    if (bare == 0)
+        return Done{};
+    return Error{ErrorCode::UnsupportedPackFeature, fmt::format("--trim {}", trim_name(mode)),
+                 fmt::format("{} of the pack's {} faces have trims without a distance texture; use --trim exact, or "
+                             "pack with --trim-memory above 0",
+                             bare, image.faces.size())};
 }
 
 const char* trim_name(TrimMode mode)

@@ -47,6 +47,20 @@ void add_surfaces(const PackImage& image, std::vector<EffectItem>& plan)
              fmt::format("{}, degree up to {}", counted(rational, "rational patch", "rational patches"), max_degree)});
 }
 
+const char* trim_effect(TrimMode mode)
+{
+    switch (mode) {
+    case TrimMode::Sdf:
+        return "trim-sdf";
+    case TrimMode::Hybrid:
+        return "trim-hybrid";
+    case TrimMode::Kd:
+        return "trim-kd";
+    default: // auto is exact
+        return "trim-exact";
+    }
+}
+
 void add_trims(const PackImage& image, const RenderOptions& options, std::vector<EffectItem>& plan)
 {
     const size_t trimmed =
@@ -55,7 +69,7 @@ void add_trims(const PackImage& image, const RenderOptions& options, std::vector
         return;
     const std::string why = fmt::format("{} of {} have trims that are not their natural border", trimmed,
                                         counted(image.faces.size(), "face", "faces"));
-    plan.push_back({options.trim == TrimMode::Sdf ? "trim-sdf" : "trim-exact", why});
+    plan.push_back({trim_effect(options.trim), why});
 }
 
 void add_placements(const PackImage& image, std::vector<EffectItem>& plan)
