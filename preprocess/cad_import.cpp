@@ -133,9 +133,15 @@ Result<CadModel> import_cad(const std::string& path, const ImportOptions& option
     model.transfer_seconds = file.transfer_seconds;
     model.warnings = std::move(file.warnings);
     if (file.parts.empty()) {
-        std::string detail = fmt::format("{} holds no faces: wires, points, annotations or other data only; export "
-                                         "solids or surfaces",
-                                         file.source_format);
+        std::string detail =
+            file.source_faces > 0
+                ? fmt::format("the kernel made no shape of the {} faces in this {} file; export it again",
+                              file.source_faces, file.source_format)
+                : fmt::format("this {} file holds no faces, only wires, points, annotations or other data; export "
+                              "solids or surfaces",
+                              file.source_format);
+        if (!file.lost_faces.empty())
+            detail += fmt::format("; {}: {}", file.lost_faces.front().name, file.lost_faces.front().reason);
         for (const std::string& warning : model.warnings)
             detail += "; " + warning;
         return Error{ErrorCode::EmptyCad, path, detail};
@@ -149,6 +155,11 @@ Result<CadModel> import_cad(const std::string& path, const ImportOptions& option
         if (progress)
             progress("faces", static_cast<double>(i + 1) / static_cast<double>(file.parts.size()));
     }
+    uint32_t next_face = static_cast<uint32_t>(model.parts.front().faces.size());
+    for (const CadDroppedFace& face : model.dropped)
+        next_face += face.part == 0 ? 1 : 0;
+    for (kernel::LoadedFile::LostFace& lost : file.lost_faces) // of no part that exists: named with the first
+        model.dropped.push_back({0, next_face++, std::move(lost.name), std::move(lost.reason)});
     model.faces_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - faces_start).count();
     if (options.proxy_deflection > 0) {
         const auto start = std::chrono::steady_clock::now();

@@ -1,6 +1,7 @@
 // Piecewise polynomial interpolation of smooth functions at Chebyshev-Lobatto nodes, in Bernstein form: how surfaces
 // and pcurves that are no splines become splines in their own parameters. Errors are measured between the nodes.
 #include "preprocess/cad_import_kernel.h"
+#include "preprocess/vec3d.h"
 
 #include <algorithm>
 #include <cmath>
@@ -75,23 +76,6 @@ const Interpolation& interpolation(int degree)
     return table[degree];
 }
 
-Vec3d operator+(Vec3d a, Vec3d b)
-{
-    return {a.x + b.x, a.y + b.y, a.z + b.z};
-}
-Vec3d operator-(Vec3d a, Vec3d b)
-{
-    return {a.x - b.x, a.y - b.y, a.z - b.z};
-}
-Vec3d operator*(double s, Vec3d a)
-{
-    return {s * a.x, s * a.y, s * a.z};
-}
-double length(Vec3d a)
-{
-    return std::sqrt(a.x * a.x + a.y * a.y + a.z * a.z);
-}
-
 /// Bernstein coefficients of the interpolant of values at the nodes.
 std::vector<Vec3d> coefficients(const Interpolation& scheme, const std::vector<Vec3d>& values)
 {
@@ -125,7 +109,7 @@ double interpolation_error(const Interpolation& scheme, const std::function<Vec3
     for (size_t i = 0; i + 1 < scheme.nodes.size(); ++i)
         for (const double s : {0.25, 0.5, 0.75}) {
             const double t = std::lerp(scheme.nodes[i], scheme.nodes[i + 1], s);
-            const double error = length(evaluate(bezier, t) - f(std::lerp(a, b, t)));
+            const double error = norm(evaluate(bezier, t) - f(std::lerp(a, b, t)));
             if (!(error <= worst)) // also true for NaN, which no span cures
                 worst = std::isnan(error) ? 1e300 : error;
         }
@@ -286,7 +270,7 @@ Result<SplineSurface> approximate_surface(const SampledSurface& source, double t
                         }
                     const Vec3d exact = source.point(std::lerp(spans_u.breaks[a], spans_u.breaks[a + 1], s),
                                                      std::lerp(spans_v.breaks[b], spans_v.breaks[b + 1], t));
-                    deviation_mm = std::max(deviation_mm, length(sum - exact));
+                    deviation_mm = std::max(deviation_mm, norm(sum - exact));
                 }
     if (!(deviation_mm <= 4 * tolerance_mm))
         return Error{ErrorCode::UnsupportedSurface, "surface", "its approximation misses the tolerance between nodes"};

@@ -46,6 +46,11 @@ struct LoadedFile {
     std::vector<std::string> warnings;
     std::string source_format, source_unit;
     double read_seconds = 0, transfer_seconds = 0;
+    size_t source_faces = 0; // faces that the file speaks of, where the reader can tell
+    struct LostFace {
+        std::string name, reason; // "#123", and the kernel's words
+    };
+    std::vector<LostFace> lost_faces; // those that the kernel made no shape of
 };
 
 enum class CadFormat { Step, Iges, BrepText, BrepBinary };
@@ -86,6 +91,7 @@ struct UvAxisMap {
     double scale = 1, offset = 0;
     int arc_count = 0;
     double arc_first = 0, arc_step = 0; // angles: arc k runs from arc_first + k * arc_step, one step long
+    bool closed = false;                // the arcs go round once, and the map repeats with them
 
     bool identity() const { return scale == 1 && offset == 0 && arc_count == 0; }
     double operator()(double x) const;
@@ -105,6 +111,10 @@ struct ConvertedSurface {
 /// Fails: InvalidSurface, UnsupportedSurface, with the reason.
 Result<ConvertedSurface> convert_surface(const TopoDS_Face& face, const Rect2d& bounds, const ImportOptions& options,
                                          double tolerance_mm);
+
+/// Returns a native surface over `bounds` (its own uv) as a rational B-spline, exactly: circles become quadratic arcs
+/// of at most 90 degrees, and the map carries angles over to their parameters (HARD_CASES 22).
+ConvertedSurface native_as_spline(const ConvertedSurface& native, const Rect2d& bounds);
 
 /// A smooth function of (u, v) and the parameters where it may be less than smooth (ends included).
 struct SampledSurface {
@@ -128,8 +138,9 @@ struct ConvertedPcurve {
 };
 Result<ConvertedPcurve> convert_pcurve(const opencascade::handle<Geom2d_Curve>& curve, double first, double last);
 
-/// Carries a pcurve over to the converted surface's parameters.
-Result<ConvertedPcurve> map_pcurve(const ConvertedPcurve& pcurve, const UvMap& map, const Rect2d& bounds);
+/// Carries a pcurve over to the converted surface's parameters: exactly where the map is affine or the pcurve runs
+/// along u or v, else within 1e-7 of an arc. Fails: InvalidTrim.
+Result<ConvertedPcurve> map_pcurve(const ConvertedPcurve& pcurve, const UvMap& map);
 
 /// The face's loops in the walk's order, in the kernel's uv. `face` must be oriented forward.
 /// Fails: InvalidTrim, with the reason.

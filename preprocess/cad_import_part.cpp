@@ -49,7 +49,7 @@ Result<CadFace> convert_face(const TopoDS_Face& face, const TopTools_IndexedMapO
         for (CadLoop& loop : out.loops)
             for (CadEdgeUse& use : loop) {
                 Result<ConvertedPcurve> mapped =
-                    map_pcurve({std::move(use.pcurve), use.first, use.last}, surface->uv_map, bounds);
+                    map_pcurve({std::move(use.pcurve), use.first, use.last}, surface->uv_map);
                 if (!mapped)
                     return mapped.error();
                 use.pcurve = std::move(mapped->curve);

@@ -218,27 +218,4 @@ Result<std::vector<CadLoop>> collect_loops(const TopoDS_Face& face, const TopToo
     return loops;
 }
 
-double UvAxisMap::operator()(double x) const
-{
-    const double angle = x * scale + offset;
-    if (arc_count == 0)
-        return angle;
-    // a rational quadratic arc of half angle a with end weights 1: tan(phi / 2) = tan(a / 2) (2 s - 1), phi from its
-    // middle; arc k has the parameters k .. k + 1
-    const double position = (angle - arc_first) / arc_step;
-    const double k = std::clamp(std::floor(position), 0.0, static_cast<double>(arc_count - 1));
-    const double phi = (position - k - 0.5) * arc_step;
-    return k + 0.5 + 0.5 * std::tan(0.5 * phi) / std::tan(0.25 * arc_step);
-}
-
-Result<ConvertedPcurve> map_pcurve(const ConvertedPcurve& pcurve, const UvMap& map, const Rect2d&)
-{
-    ConvertedPcurve out = pcurve;
-    for (auto& point : out.curve.control_points) {
-        point[0] = map.u.scale * point[0] + map.u.offset * point[2];
-        point[1] = map.v.scale * point[1] + map.v.offset * point[2];
-    }
-    return out;
-}
-
 } // namespace trimray::kernel

@@ -9,13 +9,22 @@
 #include <IGESCAFControl_Reader.hxx>
 #include <IGESData_GlobalSection.hxx>
 #include <IGESData_IGESModel.hxx>
+#include <Interface_Check.hxx>
+#include <Interface_InterfaceModel.hxx>
 #include <Interface_Static.hxx>
 #include <Message_ProgressIndicator.hxx>
 #include <STEPCAFControl_ExternFile.hxx>
 #include <STEPCAFControl_Reader.hxx>
+#include <StepData_StepModel.hxx>
+#include <StepShape_FaceSurface.hxx>
 #include <TColStd_SequenceOfAsciiString.hxx>
 #include <TDocStd_Document.hxx>
+#include <TransferBRep.hxx>
+#include <Transfer_Binder.hxx>
+#include <Transfer_TransientProcess.hxx>
 #include <XCAFApp_Application.hxx>
+#include <XSControl_TransferReader.hxx>
+#include <XSControl_WorkSession.hxx>
 
 #include <algorithm>
 #include <cctype>
@@ -211,6 +220,32 @@ struct DocumentCloser {
     }
 };
 
+/// Counts the file's faces and keeps those that were transferred to nothing, with the kernel's first words about them.
+void note_lost_faces(const STEPControl_Reader& reader, LoadedFile& file)
+{
+    const Handle(Interface_InterfaceModel) model = reader.Model();
+    const Handle(Transfer_TransientProcess) transfer = reader.WS()->TransferReader()->TransientProcess();
+    if (model.IsNull() || transfer.IsNull())
+        return;
+    for (int i = 1; i <= model->NbEntities(); ++i) {
+        const Handle(Standard_Transient) entity = model->Value(i);
+        if (!entity->IsKind(STANDARD_TYPE(StepShape_FaceSurface)))
+            continue;
+        ++file.source_faces;
+        const Handle(Transfer_Binder) binder = transfer->Find(entity);
+        if (binder.IsNull() || !TransferBRep::ShapeResult(binder).IsNull())
+            continue; // not part of anything that is transferred, or well
+        const Handle(Interface_Check) check = binder->Check();
+        std::string reason = "the kernel made no face of it";
+        if (check->NbFails() > 0)
+            reason += std::string(": ") + check->CFail(1);
+        else if (check->NbWarnings() > 0)
+            reason += std::string(": ") + check->CWarning(1);
+        file.lost_faces.push_back(
+            {fmt::format("#{}", Handle(StepData_StepModel)::DownCast(model)->IdentLabel(entity)), reason});
+    }
+}
+
 std::string model_name(const std::string& path, const ImportOptions& options)
 {
     return options.name.empty() ? std::filesystem::path(path).stem().string() : options.name;
@@ -279,6 +314,7 @@ Result<LoadedFile> load_step(const std::string& path, const ImportOptions& optio
             file.warnings.push_back(fmt::format(
                 "part of the assembly is in another file, {}, which was not found beside it or not readable",
                 it.Key().ToCString()));
+    note_lost_faces(reader.Reader(), file);
     if (transferred)
         if (const Status walked = walk_document(document, model_name(path, options), file); !walked)
             return walked.error();

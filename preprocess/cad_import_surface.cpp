@@ -342,6 +342,13 @@ Result<ConvertedSurface> approximated(const Handle(Geom_Surface) & surface, cons
     return out;
 }
 
+Rect2d mapped_bounds(const Rect2d& bounds, const UvMap& map)
+{
+    const auto [u0, u1] = std::minmax({map.u(bounds.lo.x), map.u(bounds.hi.x)});
+    const auto [v0, v1] = std::minmax({map.v(bounds.lo.y), map.v(bounds.hi.y)});
+    return {{u0, v0}, {u1, v1}};
+}
+
 bool finite(const CadSurface& s)
 {
     const auto good = [](double x) { return std::isfinite(x); };
@@ -421,7 +428,7 @@ Result<ConvertedSurface> convert(const Handle(Geom_Surface) & surface, const Rec
 
 } // namespace
 
-Result<ConvertedSurface> convert_surface(const TopoDS_Face& face, const Rect2d& bounds, const ImportOptions&,
+Result<ConvertedSurface> convert_surface(const TopoDS_Face& face, const Rect2d& bounds, const ImportOptions& options,
                                          double tolerance_mm)
 {
     TopLoc_Location location;
@@ -433,6 +440,8 @@ Result<ConvertedSurface> convert_surface(const TopoDS_Face& face, const Rect2d& 
     Result<ConvertedSurface> result = convert(surface, bounds, tolerance_mm);
     if (!result)
         return result;
+    if (!options.native_surfaces && result->surface.kind != kKindBezier)
+        result = native_as_spline(*result, mapped_bounds(bounds, result->uv_map));
     const SplineSurface& s = result->surface.spline;
     if (std::max(s.degree_u, s.degree_v) > static_cast<int>(kMaxDegree))
         return Error{ErrorCode::UnsupportedSurface, "surface",
