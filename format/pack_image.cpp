@@ -1,17 +1,17 @@
 #include "format/pack_image.h"
 
-#include <algorithm>
-
 namespace trimray {
 
 uint StringTable::add(std::string_view s)
 {
-    // names repeat in runs, and the table is small: the newest entries are the likeliest match
-    const auto found = std::find(strings.rbegin(), strings.rend(), s);
-    if (found != strings.rend())
-        return static_cast<uint>(std::distance(found, strings.rend()) - 1);
-    strings.emplace_back(s);
-    return static_cast<uint>(strings.size() - 1);
+    for (; indexed_ < strings.size(); ++indexed_) // strings that were put in by hand, or read from a pack
+        index_.try_emplace(strings[indexed_], static_cast<uint>(indexed_));
+    const auto [found, is_new] = index_.try_emplace(std::string(s), static_cast<uint>(strings.size()));
+    if (is_new) {
+        strings.emplace_back(s);
+        indexed_ = strings.size();
+    }
+    return found->second;
 }
 
 } // namespace trimray

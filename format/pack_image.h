@@ -8,6 +8,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <unordered_map>
 #include <vector>
 
 namespace trimray {
@@ -16,6 +17,10 @@ namespace trimray {
 struct StringTable {
     std::vector<std::string> strings{""};
     uint add(std::string_view s); // index of s, appended if new
+
+private:
+    std::unordered_map<std::string, uint> index_; // of the first indexed_ strings
+    size_t indexed_ = 0;
 };
 
 struct Provenance {

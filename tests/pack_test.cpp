@@ -1,3 +1,4 @@
+#include "format/derive.h"
 #include "format/pack_file.h"
 #include "format/pack_filter.h"
 #include "format/pack_reader.h"
@@ -103,6 +104,55 @@ TEST(pack, content_id_does_not_depend_on_compression)
 TEST(pack, same_image_gives_same_bytes)
 {
     EXPECT_EQ(small_pack(), small_pack());
+}
+
+/// The synthetic image with leaves, trees, cells and textures made by the functions that a compact pack relies on.
+PackImage derived_image()
+{
+    PackImage image = synthetic_image();
+    derive_leaves(image, LeafOptions(image.leaf_options));
+    derive_trees(image);
+    derive_cells(image);
+    derive_sdf(image);
+    return image;
+}
+
+TEST(pack, a_compact_pack_becomes_the_full_one_at_load)
+{
+    PackImage image = derived_image();
+    const Bytes full = encode_pack(image, WriteOptions{});
+    image.compact = true;
+    const Bytes compact = encode_pack(image, WriteOptions{});
+    EXPECT_LT(compact.size(), full.size());
+    Result<LoadedPack> loaded = decode_pack(compact, ReadOptions{});
+    ASSERT_TRUE(loaded.ok()) << loaded.error().where << ": " << loaded.error().detail;
+    image.compact = loaded->image.compact = false;
+    expect_same_image(loaded->image, image);
+    EXPECT_EQ(encode_pack(loaded->image, WriteOptions{}), full);
+}
+
+TEST(pack, what_a_compact_pack_would_unfold_to_counts_against_the_budget)
+{
+    PackImage image = derived_image();
+    image.compact = true;
+    const Bytes pack = encode_pack(image, WriteOptions{});
+    ReadOptions options;
+    options.max_decoded_bytes = header_of(pack).decoded_bytes;
+    const Result<LoadedPack> loaded = decode_pack(pack, options);
+    ASSERT_FALSE(loaded.ok());
+    EXPECT_THAT(loaded.error().where, testing::HasSubstr("3123"));
+}
+
+TEST(pack, equal_strings_share_an_index)
+{
+    StringTable table;
+    const uint a = table.add("a"), b = table.add("b");
+    table.strings.push_back("c");
+    EXPECT_EQ(table.add(""), 0u);
+    EXPECT_EQ(table.add("a"), a);
+    EXPECT_EQ(table.add("b"), b);
+    EXPECT_EQ(table.add("c"), 3u);
+    EXPECT_EQ(table.add("d"), 4u);
 }
 
 TEST(pack, every_truncation_is_refused)
