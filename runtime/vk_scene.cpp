@@ -88,6 +88,19 @@ std::span<const std::byte> bytes_of(const std::vector<T>& values)
     return std::as_bytes(std::span(values));
 }
 
+// tau of the model's nearest corner, or of the eye where that is behind it.
+float nearest_tau(const PackImage& image, const Vec3& eye, const Vec3& w0)
+{
+    double nearest = std::numeric_limits<double>::infinity();
+    for (int corner = 0; corner < 8; ++corner) {
+        Vec3 p;
+        for (size_t i = 0; i < 3; ++i)
+            p[i] = (corner >> i & 1 ? image.bounds_hi_mm[i] : image.bounds_lo_mm[i]) - eye[i];
+        nearest = std::min(nearest, dot(p, w0));
+    }
+    return nearest > 0 && nearest < 1e30 ? static_cast<float>(nearest) : 0.0f;
+}
+
 // Part mm to world mm and back, without the translation.
 struct Linear {
     Vec3 row[3];
@@ -187,6 +200,7 @@ Result<FrameSetup> frame_setup(const PackImage& image, const RenderOptions& opti
     view.width = options.width;
     view.height = options.height;
     view.error_px = options.error_px;
+    view.tau_ref = nearest_tau(image, rays.eye, setup.w0);
 
     setup.instances.resize(std::max<size_t>(image.instances.size(), 1));
     for (size_t i = 0; i < image.instances.size(); ++i) {

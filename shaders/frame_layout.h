@@ -27,7 +27,8 @@ struct FrameView {
     uint first_row; // of this band
     uint row_count;
     float error_px; // Newton stops at this share of a pixel's footprint
-    float background[3];
+    float tau_ref;  // mm; hits are kept relative to it
+    uint alone;     // 1: each workgroup traces pixel retries[workgroup] of the band, with one of its invocations
 };
 
 // An instance seen from the eye, in its part's units.
@@ -69,8 +70,7 @@ TRIMRAY_CONST uint kCountNodes = 1u;
 TRIMRAY_CONST uint kCountLeaves = 2u;
 TRIMRAY_CONST uint kCountNewton = 3u;
 TRIMRAY_CONST uint kCountCurves = 4u;
-TRIMRAY_CONST uint kCountStopped = 5u;
-TRIMRAY_CONST uint kFrameCounts = 6u;
+TRIMRAY_CONST uint kFrameCounts = 5u;
 
 // Specialisation constants of primary.comp, by constant_id
 TRIMRAY_CONST uint kSpecTrimMode = 0u; // kTrimBy
@@ -106,10 +106,11 @@ TRIMRAY_CONST uint kBindTrimPoints = 9u;
 TRIMRAY_CONST uint kBindSdfWords = 10u;
 TRIMRAY_CONST uint kBindPixels = 11u;
 TRIMRAY_CONST uint kBindCounts = 12u;
-TRIMRAY_CONST uint kFrameBindings = 13u;
+TRIMRAY_CONST uint kBindRetries = 13u;
+TRIMRAY_CONST uint kFrameBindings = 14u;
 
 #ifdef __cplusplus
-static_assert(sizeof(FrameView) == 96);
+static_assert(sizeof(FrameView) == 92);
 static_assert(sizeof(FrameInstance) == 140);
 static_assert(sizeof(FramePixel) == 52);
 } // namespace trimray

@@ -2,28 +2,38 @@
 
 // uv_face may leave [0,1] by the rounding of an angle (2.5e-7 of 2 pi) and of uv_scale: patches meet without a gap
 const float kDomainSlack = 4e-6f;
-// Newton may end outside of its leaf by this much of uv_patch, so that neighbouring leaves overlap
+// Newton may end outside of its patch by this much of uv_patch, so that neighbours overlap
 const float kUvOverlap = 1e-5f;
 const int kNewtonSteps = 12;
 const float kNewtonReach = 3.0f; // half sides of the leaf: farther from its middle the start is not this leaf's
-const float kResidualFloor = 4.0f * kRounding; // patch units: the rounding of a point with |q| about 1
+// Newton's last step is the one from a residual below this, in patch units; it ends within its square times the leaf's
+// curvature: 6e-8 is below rounding
+const float kLargestLastResidual = 2.4e-4f;
+const float kLeastResidual = 1e-6f;    // asked for before the last step,
+const float kAcceptedResidual = 4e-6f; // and accepted after it: rounding of a point with |q| about 1
+const float kBoxMargin = 1e-6f; // patch units: the ray's rounding, and the box's
 const uint kCurveIterations = 32u;             // bound of left_of_cubic
 const uint kTorusIterations = 3u * 24u + 4u * 32u; // bound of torus_roots
 
-// The nearest hit so far
+// The nearest hit so far. `past` is tau - view.tau_ref, so that what is far from the eye keeps its digits.
 struct Hit {
-    float tau; // kHuge: none yet
-    float t;   // the same along the patch's ray
+    float past; // kHuge: none yet
+    float t;    // along the patch's ray
     vec2 uv_face;
     vec2 uv_patch;
     uint leaf;
     uint instance;
+    bool doubt; // a leaf's Newton did not settle
 };
 
+// A point at t is origin + t * direction in patch space; t counts mm of tau.
 struct PatchRay {
-    vec3 origin; // patch space; the point at tau = anchor
+    vec3 origin;
     vec3 direction;
-    float anchor;
+    float anchor; // tau at t = 0
+    float past;   // anchor - view.tau_ref
+    float slack;  // rounding of a hit's `past`
+    float pixel;  // width of a pixel there, patch units
 };
 
 // Source: shaders/shared/precision.h
@@ -40,12 +50,16 @@ PatchRay patch_ray(FrameInstance instance, PatchRecord patch, vec2 pixel)
         Pair origin = Pair(patch.origin_hi[axis], patch.origin_lo[axis]);
         middle[axis] = anchored(eye, w, ray.anchor, origin);
     }
-    float per_scale = 1.0f / patch.scale;
+    precise float per_scale = 1.0f / patch.scale;
     vec3 axis_x = vector(patch.axis_x);
     vec3 axis_y = vector(patch.axis_y);
     vec3 axis_z = vector(patch.axis_z);
     ray.origin = project(axis_x, axis_y, axis_z, middle + ray.anchor * across) * per_scale;
     ray.direction = project(axis_x, axis_y, axis_z, w0 + across) * per_scale;
+    ray.past = ray.anchor - view.tau_ref;
+    // the patch's own arithmetic, |q| about 1, and one rounding of `past`
+    ray.slack = 4e-7f * (1.0f + length(middle) * per_scale) / length(ray.direction) + 1.2e-7f * abs(ray.past);
+    ray.pixel = abs(ray.anchor) * instance.footprint * per_scale;
     return ray;
 }
 
@@ -59,6 +73,8 @@ bool inside_trims(FaceRecord face, vec2 uv)
         if (trim_mode == kTrimByTexture || abs(distance_texels) > face.sdf_band_texels)
             return distance_texels > 0.0f;
     }
+    if (face.grid == 0u)
+        return false; // a face without cells has no inside
     uint word = cell_word(trim, uv);
     bool inside = cell_says_inside(word);
     if (!cell_is_mixed(word))
@@ -75,20 +91,31 @@ bool inside_trims(FaceRecord face, vec2 uv)
     }
 }
 
-// Takes the root at t if it is in front of the eye, nearer than what was found, in the domain and inside the trims.
-void offer_root(PatchRay ray, FaceRecord face, uint leaf, uint instance, float t, vec2 uv_patch, vec2 uv_face,
-                inout Hit hit)
+// In front of the eye and not behind the nearest hit
+bool in_range(PatchRay ray, float t, Hit hit)
 {
-    float tau = ray.anchor + t;
-    if (!(tau > 0.0f) || !(tau < hit.tau))
+    float past = ray.past + t;
+    return t < kHuge && past > -view.tau_ref && past < hit.past + ray.slack;
+}
+
+// Takes the root at t if it is in the face's domain, inside its trims and nearer than what was found. Of two hits
+// within rounding the one of the lower instance and leaf stays, whatever the order.
+void offer(PatchRay ray, FaceRecord face, uint leaf, uint instance, float t, vec2 uv_patch, vec2 uv_face,
+           inout Hit hit)
+{
+    vec2 off = abs(uv_face - 0.5f);
+    if (max(off.x, off.y) > 0.5f + kDomainSlack)
         return;
-    vec2 inside = clamp(uv_face, vec2(0.0f), vec2(1.0f));
-    vec2 outside = abs(uv_face - inside);
-    if (max(outside.x, outside.y) > kDomainSlack || !inside_trims(face, inside))
+    float past = ray.past + t;
+    bool first = instance < hit.instance || (instance == hit.instance && leaf < hit.leaf);
+    if (!(past < hit.past + (first ? ray.slack : -ray.slack)))
         return;
-    hit.tau = tau;
+    vec2 uv = clamp(uv_face, vec2(0.0f), vec2(1.0f));
+    if (!inside_trims(face, uv))
+        return;
+    hit.past = past;
     hit.t = t;
-    hit.uv_face = inside;
+    hit.uv_face = uv;
     hit.uv_patch = uv_patch;
     hit.leaf = leaf;
     hit.instance = instance;
@@ -142,10 +169,10 @@ void native_hit(PatchRay ray, PatchRecord patch, FaceRecord face, uint kind, uin
         roots.xy = vec2(found.t0, found.t1);
     }
     for (int i = 0; i < 4; ++i) {
-        if (roots[i] >= kHuge)
+        if (!in_range(ray, roots[i], hit))
             continue;
         vec2 uv_patch = native_uv(kind, patch, ray.origin + roots[i] * ray.direction);
-        offer_root(ray, face, leaf, instance, roots[i], uv_patch, face_uv(patch, kind, uv_patch), hit);
+        offer(ray, face, leaf, instance, roots[i], uv_patch, face_uv(patch, kind, uv_patch), hit);
     }
     iterations += 4u;
 }
@@ -164,8 +191,9 @@ void copy_control_points(PatchRecord patch, uint count)
     iterations += count;
 }
 
-void bezier_hit(PatchRay ray, PatchRecord patch, FaceRecord face, LeafBox box, float footprint, uint leaf,
-                uint instance, inout Hit hit)
+// Newton from the leaf's middle. A last step follows the residual that is small enough; what it ends at is accepted
+// anywhere on the patch, so that leaves leave no gaps.
+void bezier_hit(PatchRay ray, PatchRecord patch, FaceRecord face, LeafBox box, uint leaf, uint instance, inout Hit hit)
 {
     uint degree_u = (patch.shape >> 8) & 0xffu;
     uint degree_v = (patch.shape >> 16) & 0xffu;
@@ -174,29 +202,32 @@ void bezier_hit(PatchRay ray, PatchRecord patch, FaceRecord face, LeafBox box, f
         copy_control_points(patch, (degree_u + 1u) * (degree_v + 1u) * (rational ? 4u : 3u));
     RayPlanes planes = ray_planes(ray.origin, ray.direction);
     vec2 middle = 0.5f * (box.uv_lo + box.uv_hi);
-    vec2 reach = 0.5f * (box.uv_hi - box.uv_lo);
+    vec2 reach = kNewtonReach * (middle - box.uv_lo);
+    float enough = clamp(view.error_px * ray.pixel, kLeastResidual, kLargestLastResidual);
+    uint work = 1u + bezier_iterations(degree_u, degree_v);
     vec2 uv = middle;
-    float per_direction = 1.0f / dot(ray.direction, ray.direction);
-    uint work = bezier_iterations(degree_u, degree_v);
-    for (int step = 0; step < kNewtonSteps; ++step) {
+    bool settled = false;
+    for (int step = 0; step <= kNewtonSteps; ++step) {
         SurfacePoint s = bezier_point(patch.first_control_point, int(degree_u), int(degree_v), rational, uv);
         NewtonStep next = newton_step(s, planes, uv);
-        ++newton_steps;
-        iterations += work + 1u;
-        // not `precise`: glslc follows precise values around this loop for ever
-        float t = dot(s.p - ray.origin, ray.direction) * per_direction;
-        float allowed = max(view.error_px * footprint * max(ray.anchor + t, 0.0f), kResidualFloor);
-        if (next.residual <= allowed) {
-            vec2 off = abs(uv - middle);
-            if (off.x <= reach.x + kUvOverlap && off.y <= reach.y + kUvOverlap)
-                offer_root(ray, face, leaf, instance, t, uv, face_uv(patch, kKindBezier, uv), hit);
+        iterations += work;
+        if (settled) {
+            // not `precise`: glslc follows precise values around this loop for ever
+            float t = dot(s.p - ray.origin, ray.direction) / dot(ray.direction, ray.direction);
+            if (next.residual <= max(enough, kAcceptedResidual) && in_range(ray, t, hit))
+                offer(ray, face, leaf, instance, t, uv, face_uv(patch, kKindBezier, uv), hit);
             return;
         }
-        if (next.singular)
+        if (step == kNewtonSteps)
+            break;
+        ++newton_steps;
+        settled = next.residual <= enough || next.singular;
+        uv = clamp(next.uv, middle - reach, middle + reach);
+        vec2 off = abs(uv - 0.5f);
+        if (settled && max(off.x, off.y) > 0.5f + kUvOverlap)
             return;
-        // far outside of the leaf there is nothing to find
-        uv = clamp(next.uv, middle - kNewtonReach * reach, middle + kNewtonReach * reach);
     }
+    hit.doubt = true;
 }
 
 void leaf_hit(uint leaf, uint instance_index, FrameInstance instance, vec2 pixel, inout Hit hit)
@@ -205,16 +236,18 @@ void leaf_hit(uint leaf, uint instance_index, FrameInstance instance, vec2 pixel
     PatchRecord patch = patches[record.patch];
     PatchRay ray = patch_ray(instance, patch, pixel);
     LeafBox box = decode_leaf(record);
-    float margin = 4.0f * kRounding * (1.0f + length(ray.origin));
+    // a ray far from its patch has larger rounding
+    float margin = kBoxMargin * (1.0f + length(ray.origin));
     BoxHit in_box = leaf_box_hit(box, ray.origin, ray.direction, margin);
-    if (!in_box.hit || ray.anchor + in_box.far < 0.0f || ray.anchor + in_box.near > hit.tau)
-        return;
     ++leaf_visits;
+    if (!in_box.hit || ray.past + in_box.far < -view.tau_ref - ray.slack ||
+        ray.past + in_box.near > hit.past + ray.slack)
+        return;
     uint kind = patch.shape & 0xffu;
     FaceRecord face = faces[patch.face];
     if (kind == kKindBezier) {
         if (has_kind(kKindBezier))
-            bezier_hit(ray, patch, face, box, instance.footprint / patch.scale, leaf, instance_index, hit);
+            bezier_hit(ray, patch, face, box, leaf, instance_index, hit);
     } else
         native_hit(ray, patch, face, kind, leaf, instance_index, hit);
 }

@@ -105,6 +105,13 @@ void push_children(BvhNode node, TreeRay tree_ray, float tau_max)
     ++node_visits;
 }
 
+// No hit can be nearer than what begins beyond this: the nearest so far, and the rounding of a distance
+float hit_tau(Hit hit)
+{
+    float tau = view.tau_ref + hit.past;
+    return hit.past < kHuge ? tau + 4.0f * kRounding * abs(tau) : kHuge;
+}
+
 // Walks the trees until nothing nearer can wait. Returns false where the driver's loop limit would have cut it short.
 bool walk(vec2 pixel, vec3 across, inout Hit hit)
 {
@@ -124,15 +131,16 @@ bool walk(vec2 pixel, vec3 across, inout Hit hit)
         }
         --stack_top;
         Waiting next = stack[stack_top];
-        if (next.tau <= hit.tau) {
+        float tau_max = hit_tau(hit);
+        if (next.tau <= tau_max) {
             uint index = next.item & ~kBvhLeaf;
             bool is_leaf = (next.item & kBvhLeaf) != 0u;
             bool in_part = part_floor != kNoPart;
             if (!is_leaf) {
                 if (in_part)
-                    push_children(part_nodes[instance.first_node + index], ray, hit.tau);
+                    push_children(part_nodes[instance.first_node + index], ray, tau_max);
                 else
-                    push_children(top_nodes[index], ray, hit.tau);
+                    push_children(top_nodes[index], ray, tau_max);
             } else if (!in_part) {
                 instance_index = index;
                 instance = instances[index];
@@ -151,28 +159,41 @@ bool walk(vec2 pixel, vec3 across, inout Hit hit)
     return true;
 }
 
-// The unit normal in the world, outward as the face's orientation says, and uv_face of a hit
+// S_u x S_v of a Bezier patch; at a pole or along a degenerate side the one a little way inside
+vec3 bezier_normal(PatchRecord patch, vec2 uv)
+{
+    const float kFlat = 1e-10f; // square of the sine, or of the ratio of lengths, that rounding leaves no digits
+    const float kInwards = 1.0f / 2048.0f;
+    uint degree_u = (patch.shape >> 8) & 0xffu;
+    uint degree_v = (patch.shape >> 16) & 0xffu;
+    bool rational = has_feature(kFeatureRational) && (patch.shape & kShapeRational) != 0u;
+    if (local_floats > 0u)
+        copy_control_points(patch, (degree_u + 1u) * (degree_v + 1u) * (rational ? 4u : 3u));
+    vec3 normal = vec3(0.0f);
+    bool flat_there = true;
+    for (int attempt = 0; attempt < 2 && flat_there; ++attempt) {
+        SurfacePoint s = bezier_point(patch.first_control_point, int(degree_u), int(degree_v), rational, uv);
+        normal = cross(s.du, s.dv);
+        float du2 = dot(s.du, s.du);
+        float dv2 = dot(s.dv, s.dv);
+        flat_there = dot(normal, normal) <= kFlat * du2 * dv2 || du2 <= kFlat * dv2 || dv2 <= kFlat * du2;
+        uv += (0.5f - uv) * kInwards;
+    }
+    return normal;
+}
+
+// The normal in the world, outward as the face's orientation says, of any length
 vec3 world_normal(Hit hit, FrameInstance instance, PatchRecord patch, FaceRecord face, vec2 pixel)
 {
     uint kind = patch.shape & 0xffu;
-    vec3 axis_x = vector(patch.axis_x);
-    vec3 axis_y = vector(patch.axis_y);
-    vec3 axis_z = vector(patch.axis_z);
     PatchRay ray = patch_ray(instance, patch, pixel);
     vec3 p = ray.origin + hit.t * ray.direction;
     float r = patch.param[0];
     float second = patch.param[1];
     vec3 n = plane_normal();
-    if (kind == kKindBezier && has_kind(kKindBezier)) {
-        uint degree_u = (patch.shape >> 8) & 0xffu;
-        uint degree_v = (patch.shape >> 16) & 0xffu;
-        bool rational = has_feature(kFeatureRational) && (patch.shape & kShapeRational) != 0u;
-        if (local_floats > 0u)
-            copy_control_points(patch, (degree_u + 1u) * (degree_v + 1u) * (rational ? 4u : 3u));
-        SurfacePoint s =
-            bezier_point(patch.first_control_point, int(degree_u), int(degree_v), rational, hit.uv_patch);
-        n = cross(s.du, s.dv);
-    } else if (kind == kKindCylinder && has_kind(kKindCylinder))
+    if (kind == kKindBezier && has_kind(kKindBezier))
+        n = bezier_normal(patch, hit.uv_patch);
+    else if (kind == kKindCylinder && has_kind(kKindCylinder))
         n = cylinder_normal(p);
     else if (kind == kKindCone && has_kind(kKindCone))
         n = cone_normal(r, second, p);
@@ -180,15 +201,14 @@ vec3 world_normal(Hit hit, FrameInstance instance, PatchRecord patch, FaceRecord
         n = sphere_normal(p);
     else if (kind == kKindTorus && has_kind(kKindTorus))
         n = torus_normal(r, second, p);
+    vec3 axis_x = vector(patch.axis_x);
+    vec3 axis_y = vector(patch.axis_y);
+    vec3 axis_z = vector(patch.axis_z);
     // in left-handed axes S_u x S_v is the mirror image of the formula's
-    if (dot(cross(axis_x, axis_y), axis_z) < 0.0f)
-        n = -n;
-    if ((face.flags & kFaceReversed) != 0u)
-        n = -n;
-    n = combine(axis_x, axis_y, axis_z, n);
-    n = combine(vector(instance.normal_x), vector(instance.normal_y), vector(instance.normal_z), n);
-    float size = length(n);
-    return size > 0.0f ? n / size : vec3(0.0f);
+    bool left_handed = dot(cross(axis_x, axis_y), axis_z) < 0.0f;
+    bool reversed = (face.flags & kFaceReversed) != 0u;
+    n = combine(axis_x, axis_y, axis_z, left_handed != reversed ? -n : n);
+    return combine(vector(instance.normal_x), vector(instance.normal_y), vector(instance.normal_z), n);
 }
 
 vec3 linear_color(uint rgba)
@@ -197,7 +217,7 @@ vec3 linear_color(uint rgba)
                 linear_of_srgb(float((rgba >> 16) & 0xffu) / 255.0f));
 }
 
-FramePixel miss_pixel()
+FramePixel miss_pixel(bool doubt)
 {
     FramePixel pixel;
     pixel.depth_mm = kHuge;
@@ -205,8 +225,8 @@ FramePixel miss_pixel()
     pixel.uv_face = float[2](0.0f, 0.0f);
     pixel.face = 0u;
     pixel.instance = 0u;
-    pixel.status = kPixelCertified;
-    pixel.rgba = float[4](view.background[0], view.background[1], view.background[2], 0.0f);
+    pixel.status = doubt ? 0u : kPixelCertified;
+    pixel.rgba = float[4](0.0f, 0.0f, 0.0f, 0.0f);
     return pixel;
 }
 
@@ -218,19 +238,24 @@ FramePixel hit_pixel(Hit hit, vec2 pixel, vec3 across)
     FaceRecord face = faces[patch.face];
     vec3 direction = vector(view.w0) + across;
     float stretch = length(direction);
+    vec3 to_eye = direction / -stretch;
     vec3 normal = world_normal(hit, instance, patch, face, pixel);
+    float size = length(normal);
+    normal = size > 0.0f ? normal / size : to_eye; // a surface without a normal faces the eye
     FramePixel result;
-    result.depth_mm = hit.tau * stretch;
+    result.depth_mm = (view.tau_ref + hit.past) * stretch;
     result.normal = float[3](normal.x, normal.y, normal.z);
     result.uv_face = float[2](hit.uv_face.x, hit.uv_face.y);
     result.face = patch.face;
     result.instance = hit.instance;
     bool flagged = (leaf.quat_z_flags >> 16 & kLeafFlagged) != 0u;
-    result.status = kPixelHit | (flagged ? 0u : kPixelCertified);
-    result.rgba = float[4](0.0f, 0.0f, 0.0f, 0.0f);
+    result.status = kPixelHit | (flagged || hit.doubt ? 0u : kPixelCertified);
+    result.rgba = float[4](0.0f, 0.0f, 0.0f, 1.0f);
     if (has_feature(kFeatureShade)) {
-        uint rgba = (face.flags & kFaceHasColor) != 0u ? face.color_rgba : instance.color_rgba;
-        vec3 color = shade(linear_color(rgba), normal, -direction / stretch);
+        uint rgba = instance.color_rgba >> 24 != 0u ? instance.color_rgba : kDefaultColor;
+        if ((face.flags & kFaceHasColor) != 0u)
+            rgba = face.color_rgba;
+        vec3 color = shade(linear_color(rgba), normal, to_eye);
         result.rgba = float[4](color.x, color.y, color.z, 1.0f);
     }
     return result;
@@ -250,24 +275,26 @@ void tally(uint count, uint amount)
 void main()
 {
     uvec2 at = gl_GlobalInvocationID.xy;
-    bool in_band = at.x < view.width && at.y < view.row_count;
-    bool complete = true;
-    if (in_band) {
+    bool active_here = at.x < view.width && at.y < view.row_count;
+    if (view.alone != 0u) {
+        uint retry = retries[gl_WorkGroupID.x];
+        at = uvec2(retry % view.width, retry / view.width);
+        active_here = gl_LocalInvocationIndex == 0u;
+    }
+    if (active_here) {
         vec2 pixel = vec2(float(at.x) + 0.5f - view.middle[0], float(at.y + view.first_row) + 0.5f - view.middle[1]);
         vec3 across = pixel.x * vector(view.step_x) + pixel.y * vector(view.step_y);
-        Hit hit = Hit(kHuge, 0.0f, vec2(0.0f), vec2(0.0f), 0u, 0u);
-        complete = walk(pixel, across, hit);
-        FramePixel result = miss_pixel();
-        if (hit.tau < kHuge)
+        Hit hit = Hit(kHuge, 0.0f, vec2(0.0f), vec2(0.0f), 0xffffffffu, 0xffffffffu, false);
+        bool complete = walk(pixel, across, hit);
+        FramePixel result = miss_pixel(hit.doubt);
+        if (hit.past < kHuge)
             result = hit_pixel(hit, pixel, across);
         if (!complete)
-            result.status = (result.status | kPixelStopped) & ~kPixelCertified;
+            result.status |= kPixelStopped;
         pixels[at.y * view.width + at.x] = result;
     }
-    if (iteration_limit > 0u)
-        tally(kCountStopped, complete ? 0u : 1u);
     if (has_feature(kFeatureCount)) {
-        tally(kCountRays, in_band ? 1u : 0u);
+        tally(kCountRays, active_here && view.alone == 0u ? 1u : 0u);
         tally(kCountNodes, node_visits);
         tally(kCountLeaves, leaf_visits);
         tally(kCountNewton, newton_steps);

@@ -12,6 +12,7 @@ layout(scalar, set = 0, binding = kBindTrimPoints) readonly buffer TrimPoints { 
 layout(scalar, set = 0, binding = kBindSdfWords) readonly buffer SdfWords { uint sdf_words[]; };
 layout(scalar, set = 0, binding = kBindPixels) writeonly buffer Pixels { FramePixel pixels[]; };
 layout(scalar, set = 0, binding = kBindCounts) buffer Counts { uint counts[]; };
+layout(scalar, set = 0, binding = kBindRetries) readonly buffer Retries { uint retries[]; };
 layout(scalar, push_constant) uniform View { FrameView view; };
 
 // Specialised to what the pack holds and the frame asks for: what is false here costs no instruction.

@@ -20,7 +20,7 @@ from pathlib import Path
 
 TESTS = Path(__file__).resolve().parent
 MODEL = TESTS / "models" / "io1-cm-214.stp"  # 29 faces: planes, cylinders, tori; colours
-COMMANDS = ["pack", "render", "info", "validate", "thumbnail", "preview", "export", "version"]
+COMMANDS = ["pack", "render", "info", "validate", "thumbnail", "preview", "version"]
 OPTIONS = None  # parsed arguments
 WORK = None  # a temporary folder
 PACK = None  # a valid pack
@@ -126,7 +126,7 @@ class Usage(CliTest):
         self.fails(1, "--frob", says=["--frob"])
 
     def test_missing_arguments_are_usage_errors(self):
-        for command in ["render", "info", "validate", "thumbnail", "preview", "export"]:
+        for command in ["render", "info", "validate", "thumbnail", "preview"]:
             self.fails(1, command, says=[command, "required", f"trimray {command} --help"])
 
     def test_version_is_the_same_everywhere(self):
@@ -243,8 +243,7 @@ class Info(CliTest):
         cut = WORK / "cut.tray"
         cut.write_bytes(PACK.read_bytes()[: PACK.stat().st_size // 2])
         for command, rest in [("info", []), ("validate", []), ("render", ["-o", WORK / "x.png"]),
-                              ("thumbnail", [WORK / "x.png"]), ("preview", ["-o", WORK / "x"]),
-                              ("export", ["-o", WORK / "x.glb"])]:
+                              ("thumbnail", [WORK / "x.png"]), ("preview", ["-o", WORK / "x"])]:
             self.fails(2, command, WORK / "missing.tray", *rest, says=["missing.tray"])
             self.fails(2, command, WORK, *rest, says=[str(WORK)])  # a folder
             for file in [no_pack, empty, cut]:
