@@ -128,6 +128,20 @@ Box3d world_bounds(const InstanceRecord& instance, const PartRecord& part, const
     return world;
 }
 
+/// The model's box in world mm: what its leaves' own boxes reach, tighter than the tree's.
+void set_bounds(PackImage& image)
+{
+    tbb::parallel_for(0, 6, [&](int side) {
+        const int c = side / 2;
+        Point3 d{};
+        d[c] = side % 2 == 0 ? -1 : 1;
+        double reach = -kInf;
+        for (const InstanceRecord& instance : image.instances)
+            reach = std::max(reach, largest_along(image, instance, d));
+        (side % 2 == 0 ? image.bounds_lo_mm : image.bounds_hi_mm)[c] = d[c] * reach;
+    });
+}
+
 void build_top(PackImage& image, RTCDevice device)
 {
     constexpr int kLevels = 3; // up to 64 boxes a part
@@ -151,10 +165,9 @@ void build_top(PackImage& image, RTCDevice device)
     image.top_nodes.clear();
     if (boxes.empty())
         return;
+    set_bounds(image);
     double half = 0;
     for (int c = 0; c < 3; ++c) {
-        image.bounds_lo_mm[c] = all.lo[c];
-        image.bounds_hi_mm[c] = all.hi[c];
         image.world_origin_mm[c] = 0.5 * (all.lo[c] + all.hi[c]);
         half = std::max(half, 0.5 * (all.hi[c] - all.lo[c]));
     }

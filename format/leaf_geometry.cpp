@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 
 namespace trimray {
 namespace {
@@ -173,6 +174,38 @@ double largest_along(const NativePiece& piece, const Point3& d)
         largest = std::max(largest, here);
     }
     return largest;
+}
+
+double largest_along(const PackImage& image, const InstanceRecord& instance, const Point3& d)
+{
+    const PartRecord& part = image.parts[instance.part];
+    Point3 d_part{}; // the direction before the placement: M^T d
+    double offset = 0;
+    for (int row = 0; row < 3; ++row) {
+        for (int c = 0; c < 3; ++c)
+            d_part[c] += instance.transform[4 * row + c] * d[row];
+        offset += instance.transform[4 * row + 3] * d[row];
+    }
+    double largest = -std::numeric_limits<double>::infinity();
+    for (uint i = 0; i < part.leaf_count; ++i) {
+        const LeafRecord& leaf = image.leaves[part.first_leaf + i];
+        const PatchRecord& patch = image.patches[leaf.patch];
+        const OrientedBox box = decode_leaf_box(leaf);
+        Point3 d_patch{}; // p = origin + scale * (axis_x q_x + axis_y q_y + axis_z q_z)
+        double origin = 0;
+        for (int c = 0; c < 3; ++c) {
+            d_patch[0] += patch.axis_x[c] * d_part[c];
+            d_patch[1] += patch.axis_y[c] * d_part[c];
+            d_patch[2] += patch.axis_z[c] * d_part[c];
+            origin += (double(patch.origin_hi[c]) + double(patch.origin_lo[c])) * d_part[c];
+        }
+        double reach = dot3(box.center, d_patch);
+        for (int k = 0; k < 3; ++k)
+            reach += box.half[k] * std::abs(dot3(box.axis[k], d_patch));
+        largest = std::max(largest, origin + patch.scale * reach);
+    }
+    const Point3 part_origin{part.origin_mm[0], part.origin_mm[1], part.origin_mm[2]};
+    return offset + dot3(part_origin, d_part) + part.scale_mm * largest;
 }
 
 } // namespace trimray

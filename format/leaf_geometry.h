@@ -2,7 +2,7 @@
 // code that derives leaves and trees; the tracers decode in shaders/shared.
 #pragma once
 
-#include "format/pack_layout.h"
+#include "format/pack_image.h"
 
 #include <array>
 
@@ -49,5 +49,9 @@ NativePiece native_piece(const PatchRecord& patch, const std::array<double, 2>& 
 
 /// Returns max of S(u, v) . d over the piece, exact but for rounding.
 double largest_along(const NativePiece& piece, const Point3& d);
+
+/// Returns max of p . d over the leaf boxes of an instance's part where it is placed, p in world mm; -infinity for a
+/// part without leaves.
+double largest_along(const PackImage& image, const InstanceRecord& instance, const Point3& d);
 
 } // namespace trimray

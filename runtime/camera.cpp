@@ -86,8 +86,7 @@ CameraRays camera_rays(const Camera& camera, uint32_t width, uint32_t height)
     return rays;
 }
 
-bool standard_view(const std::string& name, const std::array<double, 3>& bounds_lo_mm,
-                   const std::array<double, 3>& bounds_hi_mm, double aspect, double fov_deg, Camera& camera)
+bool standard_view(const std::string& name, const Reach& reach, double aspect, double fov_deg, Camera& camera)
 {
     struct View {
         const char* name;
@@ -105,23 +104,26 @@ bool standard_view(const std::string& name, const std::array<double, 3>& bounds_
             continue;
         camera.fov_deg = fov_deg;
         camera.up = view.up;
-        camera.target = (bounds_lo_mm + bounds_hi_mm) * 0.5;
-        camera.eye = camera.target - view.looks_along;
+        camera.eye = {0, 0, 0};
+        camera.target = view.looks_along;
         const Axes axes = camera_axes(camera);
-        const double tan_y = half_height(fov_deg), tan_x = tan_y * aspect;
-        // the eye is far enough back when each corner of the box lies within the picture's two angles
-        double back = 0;
-        for (int corner = 0; corner < 8; ++corner) {
-            Vec3 p;
-            for (size_t i = 0; i < 3; ++i)
-                p[i] = (corner >> i & 1 ? bounds_hi_mm[i] : bounds_lo_mm[i]) - camera.target[i];
-            const double along = dot(p, axes.forward);
-            back = std::max(back, kBorder * std::abs(dot(p, axes.right)) / tan_x - along);
-            back = std::max(back, kBorder * std::abs(dot(p, axes.up)) / tan_y - along);
-        }
-        if (!(back > 0))
-            back = 1; // a point
-        camera.eye = camera.target - axes.forward * back;
+        const double tan_y = half_height(fov_deg) / kBorder, tan_x = tan_y * aspect;
+        // A point p is within the picture's right side when (p - eye) . right <= tan_x (p - eye) . forward, that is
+        // p . s <= eye . s with s = right / tan_x - forward: the reach along s. The other three sides likewise.
+        const double right = reach(axes.right * (1 / tan_x) - axes.forward);
+        const double left = reach(axes.right * (-1 / tan_x) - axes.forward);
+        const double up = reach(axes.up * (1 / tan_y) - axes.forward);
+        const double down = reach(axes.up * (-1 / tan_y) - axes.forward);
+        const double nearest = -reach(axes.forward * -1), farthest = reach(axes.forward);
+        if (!std::isfinite(right + left + up + down + nearest + farthest))
+            return true; // nothing to frame
+        // the eye may go no farther along the view than either pair of sides allows, and lies midway between them
+        double along = -0.5 * std::max(right + left, up + down);
+        if (!(along < nearest))
+            along = nearest - std::max(1.0, std::abs(nearest) * 1e-6); // a point
+        camera.eye =
+            axes.right * (0.5 * (right - left) * tan_x) + axes.up * (0.5 * (up - down) * tan_y) + axes.forward * along;
+        camera.target = camera.eye + axes.forward * (0.5 * (nearest + farthest) - along);
         return true;
     }
     return false;

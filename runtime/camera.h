@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <string>
 
 namespace trimray {
@@ -21,9 +22,11 @@ struct CameraRays {
 /// Fails never: eye = target or up along the view are mended as documented in camera.cpp.
 CameraRays camera_rays(const Camera& camera, uint32_t width, uint32_t height);
 
-/// Frames a box whole from a named view: iso, front, back, left, right, top, bottom. Empty name: iso.
-/// front looks along +y, right along -x, top along -z (z is up); iso from (1, -1, 1).
-bool standard_view(const std::string& name, const std::array<double, 3>& bounds_lo_mm,
-                   const std::array<double, 3>& bounds_hi_mm, double aspect, double fov_deg, Camera& camera);
+/// Largest of p . direction over the points p of what is framed, world mm.
+using Reach = std::function<double(const std::array<double, 3>& direction)>;
+
+/// Frames something whole from a named view: iso, front, back, left, right, top, bottom. Empty name: iso. False: no
+/// such view. front looks along +y, right along -x, top along -z (z is up); iso from (1, -1, 1).
+bool standard_view(const std::string& name, const Reach& reach, double aspect, double fov_deg, Camera& camera);
 
 } // namespace trimray

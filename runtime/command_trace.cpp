@@ -3,13 +3,17 @@
 #include "runtime/command_report.h"
 #include "runtime/image_io.h"
 
+#include "format/leaf_geometry.h"
+
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <limits>
 
 #include <algorithm>
 #include <array>
 #include <cassert>
 #include <cmath>
+#include <limits>
 
 namespace trimray {
 namespace {
@@ -134,7 +138,13 @@ Result<Camera> camera_of(const ViewArguments& arguments, const PackImage& image,
             return Error{ErrorCode::Usage, arguments.target.empty() ? "--up" : "--target",
                          "needs --eye x,y,z; without it the model is framed whole from --view"};
         const double aspect = static_cast<double>(width) / height;
-        if (!standard_view(arguments.view, lo, hi, aspect, arguments.fov_deg, camera))
+        const Reach reach = [&image](const std::array<double, 3>& direction) {
+            double largest = -std::numeric_limits<double>::infinity();
+            for (const InstanceRecord& instance : image.instances)
+                largest = std::max(largest, largest_along(image, instance, direction));
+            return largest;
+        };
+        if (!standard_view(arguments.view, reach, aspect, arguments.fov_deg, camera))
             return Error{
                 ErrorCode::Usage, "--view",
                 fmt::format("expected one of iso, front, back, left, right, top, bottom, found '{}'", arguments.view)};
