@@ -1,6 +1,7 @@
 // Leaves tile their patch, and their decoded boxes hold the surface.
 #include "format/derive.h"
 #include "format/leaf_geometry.h"
+#include "shaders/shared/leaf_box.h"
 #include "tests/random_pack.h"
 #include "tests/record_surface.h"
 
@@ -70,6 +71,32 @@ TEST(derive_leaves, a_million_random_points_lie_inside_their_leafs_box)
     }
     EXPECT_EQ(outside, 0u);
     EXPECT_GT(tightest, 0.5) << "a box is much larger than its surface";
+}
+
+TEST(derive_leaves, boxes_decode_as_the_tracers_decode_them)
+{
+    PackImage image = random_pack(9, 6, 12);
+    derive_leaves(image, LeafOptions{});
+    for (const LeafRecord& leaf : image.leaves) {
+        const OrientedBox ours = decode_leaf_box(leaf);
+        const HWY_NAMESPACE::LeafBox theirs = HWY_NAMESPACE::decode_leaf(leaf);
+        const Point3 center{theirs.center.x, theirs.center.y, theirs.center.z};
+        const Point3 half{theirs.half_extent.x, theirs.half_extent.y, theirs.half_extent.z};
+        const Point3 axes[3] = {{theirs.axis_x.x, theirs.axis_x.y, theirs.axis_x.z},
+                                {theirs.axis_y.x, theirs.axis_y.y, theirs.axis_y.z},
+                                {theirs.axis_z.x, theirs.axis_z.y, theirs.axis_z.z}};
+        const UvRect uv = uv_of(leaf);
+        ASSERT_EQ(uv.lo[0], theirs.uv_lo.x);
+        ASSERT_EQ(uv.lo[1], theirs.uv_lo.y);
+        ASSERT_EQ(uv.hi[0], theirs.uv_hi.x);
+        ASSERT_EQ(uv.hi[1], theirs.uv_hi.y);
+        for (int i = 0; i < 3; ++i) {
+            ASSERT_EQ(ours.center[i], center[i]);
+            ASSERT_EQ(ours.half[i], half[i]);
+            for (int c = 0; c < 3; ++c)
+                ASSERT_NEAR(ours.axis[i][c], axes[i][c], 1e-6);
+        }
+    }
 }
 
 TEST(derive_leaves, leaves_tile_their_patch)
