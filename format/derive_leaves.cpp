@@ -16,8 +16,13 @@ namespace {
 constexpr int kDeepestSplit = 15; // uv in steps of 1 / 32768
 // Single precision evaluates S(u, v) of |q| <= 1 to a few eps a degree, and decodes the box to a few more.
 constexpr double kRounding = 1.0 / (1 << 22);
-// A flat leaf shorter than this in its part (|p| <= 1) is not worth splitting for its aspect alone: its box is tight.
-constexpr double kShortestForAspect = 0.02;
+// A flat leaf shorter than this in its part (|p| <= 1) is not split for its aspect alone: its box is tight. Measured on
+// 10 models: 0.02 makes twice the leaves for the same visits, no splitting at all up to three times the visits.
+constexpr double kShortestForAspect = 0.1;
+// Leaves shorter than this in their part may turn more, up to kMostTurning times: few rays meet them. Measured: half to
+// a tenth of the leaves, the same share of wrong pixels (1e-5), faster.
+constexpr double kSmallLeaf = 0.05;
+constexpr double kMostTurning = 4;
 
 struct UvCell {
     int level[2] = {0, 0}; // splits in u and v
@@ -299,16 +304,18 @@ void judge(Piece& piece, double scale, const LeafOptions& options, std::vector<P
 {
     project(piece.net, scratch);
     const Shape s = measure(piece.net, scratch);
+    piece.turns = false;
     double excess[2];
     for (int i = 0; i < 2; ++i) {
-        const double turning = s.turning[i] / options.max_turning_rad;
-        const bool long_enough = s.length[i] * scale > kShortestForAspect;
-        const double aspect = long_enough ? s.length[i] / (options.max_aspect * s.length[1 - i]) : 0;
+        const double length = s.length[i] * scale; // in the part
+        const double ease = std::clamp(std::sqrt(kSmallLeaf / length), 1.0, kMostTurning);
+        const double turning = s.turning[i] / (options.max_turning_rad * ease);
+        const double aspect = length > kShortestForAspect ? s.length[i] / (options.max_aspect * s.length[1 - i]) : 0;
+        piece.turns = piece.turns || turning > 1;
         excess[i] = piece.cell.level[i] < kDeepestSplit ? std::max(turning, aspect) : 0;
     }
     piece.direction = excess[1] > excess[0] ? 1 : 0;
     piece.excess = excess[piece.direction];
-    piece.turns = s.turning[0] > options.max_turning_rad || s.turning[1] > options.max_turning_rad;
 }
 
 void add_bezier_leaves(const PackImage& image, uint patch_id, const LeafOptions& options,

@@ -34,8 +34,8 @@ struct Provenance {
 
 /// How patches are cut into leaves. Part of the pack, so that a compact one gives the same leaves at load.
 struct LeafOptions {
-    float max_turning_rad = 0.12f; // of the control polygon of a leaf, each direction
-    float max_aspect = 4.0f;       // longer side over shorter, on the surface
+    float max_turning_rad = 0.2f; // of a leaf's control polygon, each direction; small leaves may turn more
+    float max_aspect = 4.0f;      // longer side over shorter, on the surface
     uint max_leaves_per_patch = 1024;
 };
 
