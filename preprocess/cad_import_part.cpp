@@ -1,7 +1,6 @@
 // Parts: faces and edges of a shape, each face converted or dropped with a reason, and the triangles of the proxy mesh.
 #include "preprocess/cad_import_kernel.h"
 
-#include <BRepBuilderAPI_Transform.hxx>
 #include <BRepMesh_IncrementalMesh.hxx>
 #include <BRepTools.hxx>
 #include <BRep_Tool.hxx>
@@ -81,21 +80,6 @@ ShapeMap<uint32_t> face_colors(const PartShape& source)
     return colors;
 }
 
-/// A shape whose inner locations scale gets them worked into its geometry, since they change surfaces' parameters.
-TopoDS_Shape without_scaled_locations(const TopoDS_Shape& shape)
-{
-    bool scaled = false;
-    for (TopExp_Explorer face(shape, TopAbs_FACE); face.More() && !scaled; face.Next()) {
-        TopLoc_Location location;
-        BRep_Tool::Surface(TopoDS::Face(face.Current()), location);
-        scaled = std::abs(std::abs(location.Transformation().ScaleFactor()) - 1) > 1e-12;
-    }
-    if (!scaled)
-        return shape;
-    BRepBuilderAPI_Transform transform(shape, gp_Trsf(), true);
-    return transform.Shape();
-}
-
 } // namespace
 
 CadPart convert_part(const PartShape& source, uint32_t part_index, const ImportOptions& options,
@@ -103,7 +87,7 @@ CadPart convert_part(const PartShape& source, uint32_t part_index, const ImportO
 {
     CadPart part;
     part.name = source.name;
-    const TopoDS_Shape shape = without_scaled_locations(source.shape);
+    const TopoDS_Shape& shape = source.shape;
     TopTools_IndexedMapOfShape faces, edges;
     TopExp::MapShapes(shape, TopAbs_FACE, faces);
     TopExp::MapShapes(shape, TopAbs_EDGE, edges);

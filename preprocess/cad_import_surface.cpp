@@ -24,6 +24,7 @@
 #include <TColStd_Array1OfReal.hxx>
 #include <gp_Cone.hxx>
 #include <gp_Cylinder.hxx>
+#include <gp_GTrsf2d.hxx>
 #include <gp_Pln.hxx>
 #include <gp_Sphere.hxx>
 #include <gp_Torus.hxx>
@@ -435,11 +436,21 @@ Result<ConvertedSurface> convert_surface(const TopoDS_Face& face, const Rect2d& 
     Handle(Geom_Surface) surface = BRep_Tool::Surface(face, location);
     if (surface.IsNull())
         return Error{ErrorCode::InvalidSurface, "surface", "the face has none"};
-    if (!location.IsIdentity()) // scaled locations are applied to the whole part before (parametrisation changes)
-        surface = Handle(Geom_Surface)::DownCast(surface->Transformed(location.Transformation()));
-    Result<ConvertedSurface> result = convert(surface, bounds, tolerance_mm);
+    Rect2d own_bounds = bounds;
+    double scale_u = 1, scale_v = 1; // lengths among the parameters grow with a scaled placement
+    if (!location.IsIdentity()) {
+        const gp_Trsf transform = location.Transformation();
+        const gp_GTrsf2d parameters = surface->ParametricTransformation(transform);
+        scale_u = parameters.Value(1, 1);
+        scale_v = parameters.Value(2, 2);
+        own_bounds = {{bounds.lo.x * scale_u, bounds.lo.y * scale_v}, {bounds.hi.x * scale_u, bounds.hi.y * scale_v}};
+        surface = Handle(Geom_Surface)::DownCast(surface->Transformed(transform));
+    }
+    Result<ConvertedSurface> result = convert(surface, own_bounds, tolerance_mm);
     if (!result)
         return result;
+    result->uv_map.u.scale *= scale_u;
+    result->uv_map.v.scale *= scale_v;
     if (!options.native_surfaces && result->surface.kind != kKindBezier)
         result = native_as_spline(*result, mapped_bounds(bounds, result->uv_map));
     const SplineSurface& s = result->surface.spline;

@@ -24,6 +24,7 @@
 #include <TopoDS_Compound.hxx>
 #include <gp_Ax1.hxx>
 #include <gp_Ax2.hxx>
+#include <gp_Pln.hxx>
 #include <gp_Trsf.hxx>
 
 #include <cmath>
@@ -135,6 +136,38 @@ bool write_placed_copies(const std::string& from, const std::string& path)
         TopoDS_Shape image = shape;
         image.Location(TopLoc_Location(mirrored_away * mirrored_in_x()), false); // false: mirror images are meant
         builder.Add(all, image);
+        return write_shape(all, path);
+    } catch (const Standard_Failure&) {
+        return false;
+    }
+}
+
+bool write_unbounded_plane(const std::string& path)
+{
+    try {
+        BRep_Builder builder;
+        TopoDS_Compound all;
+        builder.MakeCompound(all);
+        builder.Add(all, BRepBuilderAPI_MakeFace(gp_Pln(gp_Pnt(0, 0, 0), gp_Dir(0, 0, 1)), 0, 1, 0, 1).Shape());
+        builder.Add(all, BRepBuilderAPI_MakeFace(gp_Pln(gp_Pnt(0, 0, 5), gp_Dir(0, 0, 1))).Shape());
+        return write_shape(all, path);
+    } catch (const Standard_Failure&) {
+        return false;
+    }
+}
+
+bool write_scaled_neighbour(const std::string& from, const std::string& other, double scale, const std::string& path)
+{
+    try {
+        gp_Trsf larger;
+        larger.SetScale(gp_Pnt(0, 0, 0), scale);
+        TopoDS_Shape scaled = read_step(from);
+        scaled.Location(TopLoc_Location(larger), false); // false: scaling is meant
+        BRep_Builder builder;
+        TopoDS_Compound all;
+        builder.MakeCompound(all);
+        builder.Add(all, scaled);
+        builder.Add(all, read_step(other));
         return write_shape(all, path);
     } catch (const Standard_Failure&) {
         return false;

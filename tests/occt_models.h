@@ -16,4 +16,10 @@ bool write_left_handed_copy(const std::string& from, const std::string& path);
 /// One shape of a file, placed three times: as it is, turned and moved, and mirrored.
 bool write_placed_copies(const std::string& from, const std::string& path);
 
+/// A square face beside a plane without any border, which nothing can show.
+bool write_unbounded_plane(const std::string& path);
+
+/// One shape of a file in a compound, at its own place and a second file's worth away at `scale` times its size.
+bool write_scaled_neighbour(const std::string& from, const std::string& other, double scale, const std::string& path);
+
 } // namespace trimray::oracle
