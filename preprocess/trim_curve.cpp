@@ -202,14 +202,10 @@ void find_turns(const std::vector<Node>& nodes, Coordinate coordinate, double th
         if (direction >= 0 && fallen && hi < i) {
             if (direction > 0)
                 turns.push_back(hi);
-            else if (hi > 0 && coordinate(nodes[hi].p) - coordinate(nodes[0].p) > threshold)
-                turns.push_back(hi);
             direction = -1;
             lo = hi = i;
         } else if (direction <= 0 && risen && lo < i) {
             if (direction < 0)
-                turns.push_back(lo);
-            else if (lo > 0 && coordinate(nodes[0].p) - coordinate(nodes[lo].p) > threshold)
                 turns.push_back(lo);
             direction = 1;
             lo = hi = i;
@@ -265,12 +261,15 @@ public:
             if (line_end == last || (line_end > first && line_way * kCubicBytes >= cubic_way * kLineBytes)) {
                 line(first, line_end);
                 first = line_end;
+            } else if (cubic_end > first) {
+                cubic(first, cubic_end);
+                first = cubic_end;
             } else {
-                if (cubic_end > first)
-                    cubic(first, cubic_end);
-                else
-                    interval(first); // a single step between samples that no fit improves
-                first = std::max(cubic_end, first + 1);
+                // a single step between samples, which turns by less than a run's threshold or more than a fit follows
+                interval(first);
+                if (candidate_deviation_ > tolerance_)
+                    chords(first, pieces);
+                first += 1;
             }
             pieces.push_back(candidate_);
             deviation_ = std::max(deviation_, candidate_deviation_);
@@ -354,6 +353,28 @@ private:
             candidate_deviation_ = std::max(candidate_deviation_, distance(candidate_.p, q, s));
             return true;
         });
+    }
+
+    /// The same step as short lines: all but the last are appended, the last is the candidate.
+    void chords(size_t i, std::vector<CurvePiece>& pieces)
+    {
+        const Node &a = nodes_[i], &b = nodes_[i + 1];
+        for (int count = 2; count <= 64; count *= 2) {
+            std::vector<CurvePiece> lines;
+            double worst = 0;
+            for (int k = 0; k < count; ++k) {
+                const double s = static_cast<double>(k) / count, e = static_cast<double>(k + 1) / count;
+                const Vec2d p = k == 0 ? a.p : between(a, b, s), q = k + 1 == count ? b.p : between(a, b, e);
+                lines.push_back({{p, p + (1 / 3.0) * (q - p), p + (2 / 3.0) * (q - p), q}, false});
+                worst = std::max(worst, length(between(a, b, 0.5 * (s + e)) - 0.5 * (p + q)));
+            }
+            candidate_ = lines.back();
+            candidate_deviation_ = worst;
+            if (worst <= tolerance_ || count == 64) {
+                pieces.insert(pieces.end(), lines.begin(), lines.end() - 1);
+                return;
+            }
+        }
     }
 
     /// Distance of q from the cubic; t: where to start, and where the foot was found.

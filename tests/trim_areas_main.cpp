@@ -1,10 +1,12 @@
 // trim_areas FILE...: every face's area from its trims beside the CAD kernel's own (BRepGProp), and what the trims
 // take. A tool for corpora; the kernel's areas share no code with ours.
 #include "format/derive.h"
+#include "format/trim_query.h"
 #include "preprocess/bezier_patch.h"
 #include "preprocess/build_pack.h"
 #include "preprocess/cad_import_kernel.h"
 #include "tests/trim_areas.h"
+#include "tests/trim_shapes.h"
 
 #include <BRepGProp.hxx>
 #include <GProp_GProps.hxx>
@@ -15,6 +17,7 @@
 #include <chrono>
 #include <cmath>
 #include <fmt/format.h>
+#include <random>
 
 namespace {
 
@@ -76,6 +79,8 @@ int check(const std::string& path, double worst_allowed)
             gap = std::max(gap, loops->largest_gap);
             GProp_GProps properties;
             BRepGProp::SurfaceProperties(shapes(static_cast<int>(face.face_in_part) + 1), properties);
+            if (loops->largest_deviation > 1e-5)
+                fmt::print("  deviation {:.1e}: {}\n", loops->largest_deviation, what);
             what += fmt::format(" pieces {} gap {:.1e} tol {:.1e} took {:.1f} ms{}", loops->pieces.size(),
                                 loops->largest_gap, face.tolerance_mm, 1e3 * took, loops->had_open_loop ? " OPEN" : "");
             const double ours = trimmed_area(face.surface, *loops);
@@ -104,6 +109,20 @@ int check(const std::string& path, double worst_allowed)
     auto start = std::chrono::steady_clock::now();
     derive_cells(image);
     const double cells_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    // the cells' answers at random points beside an exact count of crossings
+    size_t asked = 0, wrong = 0;
+    std::mt19937 rng(1);
+    std::uniform_real_distribution<float> uniform(0, 1);
+    for (uint f = 0; f < image.faces.size(); ++f) {
+        if (image.faces[f].piece_count == 0)
+            continue;
+        const std::vector<MonotonePiece> pieces = shapes::pieces_of(image, f);
+        for (int i = 0; i < 300; ++i, ++asked) {
+            const float u = uniform(rng), v = uniform(rng);
+            wrong += trim_inside(image, f, u, v) != shapes::exact_inside(pieces, u, v) &&
+                     shapes::exact_distance(pieces, u, v) > 1e-6;
+        }
+    }
     start = std::chrono::steady_clock::now();
     allocate_trim_memory(image, kd_trim_bytes(image), TrimLayout::Isotropic);
     derive_sdf(image);
@@ -134,7 +153,8 @@ int check(const std::string& path, double worst_allowed)
         }
     fmt::print("{}: faces {} natural {} failed {} open {} pieces {} ({} cubic) deviation {:.1e} gap {:.1e}\n", path,
                faces, natural, failed, open, image.trim_pieces.size(), cubics, deviation, gap);
-    fmt::print("  area off by > 1e-3: {}, > 1e-5: {}; total {:.6g} against {:.6g}\n", off3, off5, ours, theirs);
+    fmt::print("  area off by > 1e-3: {}, > 1e-5: {}; total {:.6g} against {:.6g}; cells wrong at {} of {} points\n",
+               off3, off5, ours, theirs, wrong, asked);
     fmt::print("  loops {:.3f} s (slowest face {:.3f}), cells {:.3f} s, textures {:.3f} s\n", seconds, slowest,
                cells_seconds, sdf_seconds);
     fmt::print("  bytes: points and pieces {}, cells {}, entries {}, textures {}, kd {}; entries a mixed cell {:.2f}, "
