@@ -3,6 +3,7 @@
 #include "preprocess/vec3d.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -116,8 +117,8 @@ Status append_quadric_or_torus(const CadSurface& s, const Rect2d& d, const PartF
                                std::vector<PatchRecord>& patches)
 {
     const NativeSize size = native_size(s, d);
-    if (!(size.bound > 0) || !(s.radius >= 0) || !(s.minor_radius >= 0))
-        return invalid(s, fmt::format("radius {} (minor {}) gives no surface", s.radius, s.minor_radius));
+    if (!(size.bound > 0))
+        return invalid(s, "its radii are zero");
     const double unit = place(s.frame.origin + size.origin_along_z * s.frame.z, size.bound, frame, patch);
     const double u = 0.5 * (d.lo.x + d.hi.x), side = size.turned ? -1 : 1;
     const double c = side * std::cos(u), si = side * std::sin(u);
@@ -209,6 +210,99 @@ void append_bezier(const BezierPatch& bezier, const Rect2d& d, const PartFrame& 
     patches.push_back(patch);
 }
 
+// ---- native surfaces that are nearly flat over their domain --------------------------------------------------------
+
+constexpr int kFlatDegree = 4;
+using FlatCurve = std::array<double, kFlatDegree + 1>; // a polynomial's Bezier values on [-half, half]
+
+/// Bezier values of sum_k a_k t^k on [-half, half], by its blossom (Piegl & Tiller 6.4).
+FlatCurve bezier_values(const FlatCurve& a, double half)
+{
+    constexpr double kChoose[kFlatDegree + 1] = {1, 4, 6, 4, 1};
+    FlatCurve out{};
+    for (int j = 0; j <= kFlatDegree; ++j) {
+        // elementary symmetric polynomials of j times +half and 4 - j times -half
+        FlatCurve symmetric{1, 0, 0, 0, 0};
+        for (int i = 0; i < kFlatDegree; ++i)
+            for (int k = kFlatDegree; k > 0; --k)
+                symmetric[k] += symmetric[k - 1] * (i < j ? half : -half);
+        for (int k = 0; k <= kFlatDegree; ++k)
+            out[j] += a[k] * symmetric[k] / kChoose[k];
+    }
+    return out;
+}
+
+/// cos t - 1 and sin t as polynomials: off by half^5 / 120, 1e-11 for the widest arc that asks for them.
+FlatCurve cosine_less_one(double half)
+{
+    return bezier_values({0, 0, -0.5, 0, 1.0 / 24}, half);
+}
+FlatCurve sine(double half)
+{
+    return bezier_values({0, 1, 0, -1.0 / 6, 0}, half);
+}
+
+/// a x + b y
+FlatCurve blend(double a, const FlatCurve& x, double b, const FlatCurve& y)
+{
+    FlatCurve out;
+    for (int i = 0; i <= kFlatDegree; ++i)
+        out[i] = a * x[i] + b * y[i];
+    return out;
+}
+
+/// Whether the domain is so small beside the radii that single precision around the axis would lose it: 1/32 of them
+/// leaves 2e-6 of the face. Arcs are then short enough for polynomials in the same parameters.
+bool nearly_flat(const CadSurface& s, const Rect2d& d)
+{
+    constexpr double kSmallShare = 1.0 / 32;
+    const NativeSize size = native_size(s, d);
+    const double du = d.hi.x - d.lo.x, dv = d.hi.y - d.lo.y;
+    const bool v_is_angle = s.kind == kKindSphere || s.kind == kKindTorus;
+    if (du > kSmallShare || (v_is_angle && dv > kSmallShare))
+        return false;
+    const SurfaceExtent extent = surface_extent(s, d);
+    return std::hypot(extent.length_u_mm, extent.length_v_mm) < kSmallShare * size.bound;
+}
+
+/// The surface over its domain as one polynomial patch in its own parameters, exact to rounding in single precision:
+///   S - P = C(u) rho_0 X + S(u) rho_0 Y + delta(v) (1 + C(u)) X + delta(v) S(u) Y + eta(v) Z
+/// with C = cos - 1, S = sin from the middle, rho = rho_0 + delta the distance from the axis, eta the height.
+BezierPatch nearly_flat_patch(const CadSurface& s, const Rect2d& d)
+{
+    const double u = 0.5 * (d.lo.x + d.hi.x), v = 0.5 * (d.lo.y + d.hi.y);
+    const double half_u = 0.5 * (d.hi.x - d.lo.x), half_v = 0.5 * (d.hi.y - d.lo.y);
+    const CadFrame& f = s.frame;
+    const Vec3d x = std::cos(u) * f.x + std::sin(u) * f.y, y = std::cos(u) * f.y - std::sin(u) * f.x;
+    const Vec3d middle = evaluate(s, u, v).p;
+    const FlatCurve cos_u = cosine_less_one(half_u), sin_u = sine(half_u);
+    const FlatCurve line = bezier_values({0, 1, 0, 0, 0}, half_v);
+    double rho = s.radius;
+    FlatCurve delta{}, eta = line;
+    if (s.kind == kKindCone) {
+        rho += v * std::sin(s.half_angle);
+        delta = blend(std::sin(s.half_angle), line, 0, line);
+        eta = blend(std::cos(s.half_angle), line, 0, line);
+    } else if (s.kind != kKindCylinder) {
+        const double r = s.kind == kKindTorus ? s.minor_radius : s.radius;
+        const FlatCurve cos_v = cosine_less_one(half_v), sin_v = sine(half_v);
+        rho = (s.kind == kKindTorus ? s.radius : 0) + r * std::cos(v);
+        delta = blend(r * std::cos(v), cos_v, -r * std::sin(v), sin_v);
+        eta = blend(r * std::sin(v), cos_v, r * std::cos(v), sin_v);
+    }
+    BezierPatch patch;
+    patch.degree_u = patch.degree_v = kFlatDegree;
+    patch.domain = d;
+    for (int i = 0; i <= kFlatDegree; ++i) {
+        for (int j = 0; j <= kFlatDegree; ++j) {
+            const double along_x = cos_u[i] * rho + delta[j] * (1 + cos_u[i]), along_y = sin_u[i] * (rho + delta[j]);
+            const Vec3d p = middle + along_x * x + along_y * y + eta[j] * f.z;
+            patch.control_points.push_back({p.x, p.y, p.z, 1});
+        }
+    }
+    return patch;
+}
+
 Status append_splines(const CadSurface& s, const Rect2d& d, const PartFrame& frame, const PatchRecord& patch,
                       std::vector<PatchRecord>& patches, std::vector<float>& control_points)
 {
@@ -243,11 +337,17 @@ Status append_patches(const CadSurface& surface, const Rect2d& domain, const Par
     if (surface.kind != kKindBezier && (!finite(f.origin) || !finite(f.x) || !finite(f.y) || !finite(f.z) ||
                                         !std::isfinite(surface.radius) || !std::isfinite(surface.minor_radius)))
         return invalid(surface, "its axes or radii are not finite");
+    if (surface.kind != kKindBezier && (surface.radius < 0 || surface.minor_radius < 0))
+        return invalid(surface, fmt::format("radius {} (minor {}) is negative", surface.radius, surface.minor_radius));
     PatchRecord patch{};
     patch.face = face;
     patch.shape = surface.kind;
     if (surface.kind == kKindPlane)
         return append_plane(surface, d, frame, patch, patches);
+    if (surface.kind != kKindBezier && nearly_flat(surface, d)) {
+        append_bezier(nearly_flat_patch(surface, d), d, frame, patch, patches, control_points);
+        return Done{};
+    }
     if (surface.kind != kKindBezier)
         return append_quadric_or_torus(surface, d, frame, patch, patches);
     return append_splines(surface, d, frame, patch, patches, control_points);
