@@ -66,8 +66,7 @@ inline constexpr uint64_t kFrameBytes = 1ull << 20; // largest decoded size of a
 inline constexpr uint32_t kMaxSections = 256;
 inline constexpr uint32_t kMaxStride = 4096;
 inline constexpr uint64_t kMaxElements = 0x7fffffffull; // indices are 32 bits, and bit 31 marks leaves
-inline constexpr uint64_t kMaxPictureBytes = 64ull << 20;
-inline constexpr uint32_t kMaxLeavesPerPatch = 1u << 16;
+inline constexpr uint32_t kMaxLeavesPerPatch = 4096;
 
 /// Plain sections lie where a mapping or an upload can use them as they are; compressed ones are only read through.
 inline constexpr uint64_t kPlainAlignment = 64;

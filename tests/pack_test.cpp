@@ -447,25 +447,31 @@ uint64_t walk(const PackImage& m)
     return sum;
 }
 
+/// Changes one word of array number `target`, to a telling value or by one bit.
+void mutate(PackImage& image, int target, std::mt19937& random)
+{
+    const uint interesting[] = {0,           1,           2,           3,           100,         0x7fffffffu,
+                                0x80000000u, 0xffffffffu, 0x7fc00000u, 0x3f800000u, 0x53e8d4a5u, 0x00000001u};
+    int index = 0;
+    for_each_array(image, [&](std::string_view, bool, auto& array) {
+        const auto words = std::as_writable_bytes(std::span(array));
+        if (index++ != target || words.empty())
+            return;
+        const size_t at = random() % (words.size() / 4) * 4;
+        uint word;
+        std::memcpy(&word, &words[at], 4);
+        word = random() % 2 == 0 ? interesting[random() % std::size(interesting)] : word ^ 1u << random() % 32;
+        std::memcpy(&words[at], &word, 4);
+    });
+}
+
 TEST(pack, whatever_passes_validation_can_be_walked)
 {
     std::mt19937 random(7);
-    const uint interesting[] = {0, 1, 2, 3, 0x7fffffffu, 0x80000000u, 0xffffffffu, 0x7fc00000u, 0x3f800000u, 100};
     int accepted = 0, refused = 0;
     for (int round = 0; round < 20000; ++round) {
         PackImage image = synthetic_image();
-        const int target = static_cast<int>(random() % 15);
-        int index = 0;
-        for_each_array(image, [&](std::string_view, bool, auto& array) {
-            const auto words = std::as_writable_bytes(std::span(array));
-            if (index++ != target || words.empty())
-                return;
-            const size_t at = random() % (words.size() / 4) * 4;
-            uint word;
-            std::memcpy(&word, &words[at], 4);
-            word = random() % 2 == 0 ? interesting[random() % std::size(interesting)] : word ^ 1u << random() % 32;
-            std::memcpy(&words[at], &word, 4);
-        });
+        mutate(image, static_cast<int>(random() % 15), random);
         if (validate_image(image).empty()) {
             ++accepted;
             ASSERT_NO_THROW(walk(image));
@@ -475,6 +481,28 @@ TEST(pack, whatever_passes_validation_can_be_walked)
     }
     EXPECT_GT(accepted, 1000); // colours, distances and the like are free
     EXPECT_GT(refused, 1000);
+}
+
+TEST(pack, hostile_compact_packs_unfold_to_something_that_can_be_walked_or_are_refused)
+{
+    std::mt19937 random(8);
+    const int base_arrays[] = {2, 4, 6, 7, 10, 11}; // parts, faces, patches, control points, trim points and pieces
+    int accepted = 0;
+    for (int round = 0; round < 1500; ++round) {
+        PackImage image = synthetic_image();
+        image.compact = true;
+        image.leaf_options.max_leaves_per_patch = 64;
+        for (uint k = 0; k < 1 + random() % 2; ++k)
+            mutate(image, base_arrays[random() % std::size(base_arrays)], random);
+        ReadOptions options;
+        options.max_decoded_bytes = 64 << 20;
+        const Result<LoadedPack> loaded = decode_pack(encode_pack(image, WriteOptions{0}), options);
+        if (!loaded.ok())
+            continue;
+        ++accepted;
+        ASSERT_NO_THROW(walk(loaded->image));
+    }
+    EXPECT_GT(accepted, 100);
 }
 
 TEST(pack_filter, columns_come_back)
