@@ -30,7 +30,6 @@ constexpr float kDomainSlack = 4e-6f;
 // Newton may end outside of its patch by this much of uv_patch, so that neighbours overlap
 constexpr float kUvOverlap = 1e-5f;
 constexpr int kNewtonSteps = 12;
-constexpr float kNewtonReach = 3.0f; // half sides of the leaf: farther from its middle the start is not this leaf's
 
 class BlockTracer {
 public:
@@ -247,24 +246,24 @@ private:
         const PatchRecord& patch = target.patch;
         const int degree_u = int(patch.shape >> 8 & 0xffu), degree_v = int(patch.shape >> 16 & 0xffu);
         const bool rational = (patch.shape & kShapeRational) != 0;
-        const scalar middle_u = 0.5f * (box.uv_lo.x + box.uv_hi.x), middle_v = 0.5f * (box.uv_lo.y + box.uv_hi.y);
-        const scalar reach_u = kNewtonReach * (middle_u - box.uv_lo.x),
-                     reach_v = kNewtonReach * (middle_v - box.uv_lo.y);
+        const real2 middle = scalar2(0.5f * (box.uv_lo.x + box.uv_hi.x), 0.5f * (box.uv_lo.y + box.uv_hi.y));
         const RayPlanes planes = ray_planes(origin, direction);
         // a step from this far ends within its square, times the leaf's curvature: 6e-8 is below rounding
         const scalar enough = min(max(job_.error_px * target.view.pixel, 1e-6f), 2.4e-4f);
-        real2 uv = scalar2(middle_u, middle_v);
+        real2 uv = middle;
         mask settled = mask(false);
         for (int step = 0; step < kNewtonSteps && any_lane(moving); ++step) {
             const SurfacePoint s = evaluate(patch.first_control_point, degree_u, degree_v, rational, uv);
             const NewtonStep next = newton_step(s, planes, uv);
             ++work_.newton_steps;
-            const mask done = next.residual <= enough || next.singular;
-            real2 to = real2(clamp(next.uv.x, real(middle_u - reach_u), real(middle_u + reach_u)),
-                             clamp(next.uv.y, real(middle_v - reach_v), real(middle_v + reach_v)));
+            const mask close = next.residual <= enough;
+            const real2 to = real2(kept_near_leaf(next.uv.x, box.uv_lo.x, box.uv_hi.x),
+                                   kept_near_leaf(next.uv.y, box.uv_lo.y, box.uv_hi.y));
+            // at the bounds of its reach, and drawn outwards: the root is not here
+            const mask stuck = next.singular || (to.x == uv.x && to.y == uv.y);
             uv = select(moving, to, uv);
-            settled = settled || (moving && done);
-            moving = moving && !done;
+            settled = settled || (moving && close);
+            moving = moving && !close && !stuck;
         }
         hit.doubt = hit.doubt || moving;
         const mask inside = settled && abs(uv.x - 0.5f) <= 0.5f + kUvOverlap && abs(uv.y - 0.5f) <= 0.5f + kUvOverlap;
@@ -310,7 +309,7 @@ private:
         mask taken = near && abs(uv.x - 0.5f) <= 0.5f + kDomainSlack && abs(uv.y - 0.5f) <= 0.5f + kDomainSlack;
         if (!any_lane(taken))
             return;
-        uv = real2(clamp(uv.x, real(0.0f), real(1.0f)), clamp(uv.y, real(0.0f), real(1.0f)));
+        uv = real2(clamp(uv.x, real(0.0f), real(kUvBelowOne)), clamp(uv.y, real(0.0f), real(kUvBelowOne)));
         // of two hits within rounding the one of the lower instance and leaf stays, whatever the order
         const real at = target.view.base_mm + target.view.mm_per_t * t;
         const integer leaf(target.candidate.leaf), instance(target.candidate.instance);

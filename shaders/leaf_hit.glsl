@@ -5,7 +5,6 @@ const float kDomainSlack = 4e-6f;
 // Newton may end outside of its patch by this much of uv_patch, so that neighbours overlap
 const float kUvOverlap = 1e-5f;
 const int kNewtonSteps = 12;
-const float kNewtonReach = 3.0f; // half sides of the leaf: farther from its middle the start is not this leaf's
 // Newton's last step is the one from a residual below this, in patch units; it ends within its square times the leaf's
 // curvature: 6e-8 is below rounding
 const float kLargestLastResidual = 2.4e-4f;
@@ -110,7 +109,7 @@ void offer(PatchRay ray, FaceRecord face, uint leaf, uint instance, float t, vec
     bool first = instance < hit.instance || (instance == hit.instance && leaf < hit.leaf);
     if (!(past < hit.past + (first ? ray.slack : -ray.slack)))
         return;
-    vec2 uv = clamp(uv_face, vec2(0.0f), vec2(1.0f));
+    vec2 uv = clamp(uv_face, vec2(0.0f), vec2(kUvBelowOne));
     if (!inside_trims(face, uv))
         return;
     hit.past = past;
@@ -202,7 +201,6 @@ void bezier_hit(PatchRay ray, PatchRecord patch, FaceRecord face, LeafBox box, u
         copy_control_points(patch, (degree_u + 1u) * (degree_v + 1u) * (rational ? 4u : 3u));
     RayPlanes planes = ray_planes(ray.origin, ray.direction);
     vec2 middle = 0.5f * (box.uv_lo + box.uv_hi);
-    vec2 reach = kNewtonReach * (middle - box.uv_lo);
     float enough = clamp(view.error_px * ray.pixel, kLeastResidual, kLargestLastResidual);
     uint work = 1u + bezier_iterations(degree_u, degree_v);
     vec2 uv = middle;
@@ -221,8 +219,13 @@ void bezier_hit(PatchRay ray, PatchRecord patch, FaceRecord face, LeafBox box, u
         if (step == kNewtonSteps)
             break;
         ++newton_steps;
-        settled = next.residual <= enough || next.singular;
-        uv = clamp(next.uv, middle - reach, middle + reach);
+        settled = next.residual <= enough;
+        vec2 to = vec2(kept_near_leaf(next.uv.x, box.uv_lo.x, box.uv_hi.x),
+                       kept_near_leaf(next.uv.y, box.uv_lo.y, box.uv_hi.y));
+        // at the bounds of its reach, and drawn outwards: the root is not here
+        if (!settled && (next.singular || to == uv))
+            return;
+        uv = to;
         vec2 off = abs(uv - 0.5f);
         if (settled && max(off.x, off.y) > 0.5f + kUvOverlap)
             return;

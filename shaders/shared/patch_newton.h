@@ -61,5 +61,17 @@ FN NewtonStep newton_step(SurfacePoint s, RayPlanes ray, real2 uv)
     return next;
 }
 
+// How far Newton's iterates may leave the leaf that they started in, in half sides from its middle: farther roots are
+// other leaves' to find. And how far they may leave the patch, in uv_patch: a rational patch has poles outside.
+const scalar kNewtonReach = 2.0f;
+const scalar kNewtonOutside = 1e-3f;
+
+FN real kept_near_leaf(real u, scalar leaf_lo, scalar leaf_hi)
+{
+    scalar middle = 0.5f * (leaf_lo + leaf_hi);
+    scalar reach = kNewtonReach * (middle - leaf_lo);
+    return clamp(u, real(max(middle - reach, -kNewtonOutside)), real(min(middle + reach, 1.0f + kNewtonOutside)));
+}
+
 SHARED_CLOSE
 #endif

@@ -15,6 +15,10 @@ SHARED_OPEN
 // Data comes through fetch_cell, fetch_entry_word, fetch_entry_eta, fetch_trim_point (index in points) and
 // fetch_sdf_word.
 
+// The largest number below 1: uv_face is clamped to it, so that the domain's upper borders belong to the face as the
+// lower ones do
+const scalar kUvBelowOne = 0.99999994f;
+
 // The constants of one face
 struct TrimFace {
     uint columns;
@@ -41,7 +45,7 @@ FN TrimFace trim_face(FaceRecord face)
     return trim;
 }
 
-// The cell's word at uv_face, which must lie in [0,1]^2
+// The cell's word at uv_face, which must lie in [0, kUvBelowOne]^2
 FN integer cell_word(FETCH_PARAM TrimFace face, real2 uv)
 {
     PRECISE real column = uv.x * scalar(face.columns);
