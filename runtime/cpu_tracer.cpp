@@ -40,10 +40,16 @@ void add(WorkCounts& sum, const WorkCounts& part)
     sum.uncertified_pixels += part.uncertified_pixels;
 }
 
+/// The scene's own, or a new one.
+std::shared_ptr<const CpuScene> prepared(const Scene& scene)
+{
+    return scene.prepared ? scene.prepared : std::make_shared<CpuScene>(scene.pack.image);
+}
+
 class CpuTracer final : public Tracer {
 public:
     CpuTracer(std::shared_ptr<const Scene> scene, TraceBlock trace_block, const std::string& instruction_set)
-        : scene_(std::move(scene)), cpu_scene_(scene_->pack.image), trace_block_(trace_block),
+        : scene_(std::move(scene)), cpu_scene_(prepared(*scene_)), trace_block_(trace_block),
           name_(fmt::format("CPU, {}", instruction_set))
     {
     }
@@ -82,10 +88,10 @@ private:
     WorkCounts render_once(const RenderOptions& options, TrimMode trim, int threads, tbb::task_arena& arena,
                            Frame& frame)
     {
-        const View view = make_view(cpu_scene_.image, camera_rays(options.camera, options.width, options.height),
+        const View view = make_view(cpu_scene_->image, camera_rays(options.camera, options.width, options.height),
                                     options.width, options.height);
-        const BlockJob job{cpu_scene_,      view, options.width, options.height, trim == TrimMode::Sdf, options.shade,
-                           options.error_px};
+        const BlockJob job{*cpu_scene_,           view,          options.width,   options.height,
+                           trim == TrimMode::Sdf, options.shade, options.error_px};
         const uint32_t columns = (options.width + kBlockSide - 1) / kBlockSide,
                        rows = (options.height + kBlockSide - 1) / kBlockSide;
         tbb::enumerable_thread_specific<WorkCounts> counts;
@@ -107,7 +113,7 @@ private:
     }
 
     std::shared_ptr<const Scene> scene_;
-    CpuScene cpu_scene_;
+    std::shared_ptr<const CpuScene> cpu_scene_;
     TraceBlock trace_block_;
     std::string name_;
     tbb::enumerable_thread_specific<BlockScratch> scratch_;
@@ -137,9 +143,9 @@ RayHit trace_ray(const Scene& scene, const std::array<double, 3>& origin_mm, con
     const bool has_direction = direction[0] != 0 || direction[1] != 0 || direction[2] != 0;
     if (!trace_block || !has_direction)
         return result;
-    const CpuScene cpu_scene(scene.pack.image);
+    const auto cpu_scene = prepared(scene);
     const View view = make_single_ray_view(scene.pack.image, origin_mm, direction);
-    const BlockJob job{cpu_scene, view, 1, 1, false, false, 0.02f};
+    const BlockJob job{*cpu_scene, view, 1, 1, false, false, 0.02f};
     Frame frame;
     resize(frame, 1, 1);
     const auto scratch = std::make_unique<BlockScratch>();

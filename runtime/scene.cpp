@@ -1,3 +1,4 @@
+#include "runtime/cpu_view.h"
 #include "runtime/tracer.h"
 
 #include <utility>
@@ -13,6 +14,7 @@ Result<std::shared_ptr<const Scene>> load_scene(const std::string& path, bool pr
         return pack.error();
     auto scene = std::make_shared<Scene>();
     scene->pack = std::move(*pack);
+    scene->prepared = std::make_shared<CpuScene>(scene->pack.image);
     return std::shared_ptr<const Scene>(std::move(scene));
 }
 

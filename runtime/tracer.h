@@ -13,9 +13,12 @@
 
 namespace trimray {
 
+struct CpuScene;
+
 /// A loaded, validated pack, ready to trace.
 struct Scene {
     LoadedPack pack;
+    std::shared_ptr<const CpuScene> prepared; // what the CPU tracer adds; load_scene fills it, others make their own
     bool has_cells() const { return !pack.image.cells.empty(); }
 };
 
