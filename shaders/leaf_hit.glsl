@@ -14,6 +14,10 @@ const float kBoxMargin = 1e-6f; // patch units: the ray's rounding, and the box'
 const uint kCurveIterations = 32u;             // bound of left_of_cubic
 const uint kTorusIterations = 3u * 24u + 4u * 32u; // bound of torus_roots
 
+// Where loops are limited, one leaf may take so many iterations: 13 steps at degree 25, and a few hundred trim pieces
+const uint kRoundIterations = 20000u;
+bool overrun = false; // a leaf took more
+
 // The nearest hit so far. `past` is tau - view.tau_ref, so that what is far from the eye keeps its digits.
 struct Hit {
     float past; // kHuge: none yet
@@ -84,6 +88,10 @@ bool inside_trims(FaceRecord face, vec2 uv)
         inside = differ(inside, entry_crossed(trim, entry.word, entry.eta, uv));
         ++curve_tests;
         iterations += 1u + kCurveIterations;
+        if (iteration_limit > 0u && iterations > kRoundIterations) {
+            overrun = true;
+            return false;
+        }
         if (entry_is_last(entry.word))
             return inside;
         ++at;

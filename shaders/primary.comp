@@ -152,7 +152,7 @@ bool walk(vec2 pixel, vec3 across, inout Hit hit)
         }
         if (iteration_limit > 0u) {
             group_iterations += subgroupMax(iterations);
-            if (group_iterations > iteration_limit)
+            if (group_iterations > iteration_limit || overrun)
                 return false;
         }
     }
