@@ -25,6 +25,7 @@ enum class TrimLayout { Isotropic, Square };
 
 /// Sets each trimmed face's sdf_size so that the textures take about total_bytes: M_i = ceil(M_total A_i / sum A),
 /// H_i = floor(sqrt(M_i)) (paper eq. 4, 5) in the square layout; the isotropic one has equal texels on the surface.
+/// Bytes are texels here: what rows padded to whole words take beyond H_i^2 comes on top.
 void allocate_trim_memory(PackImage& image, double total_bytes, TrimLayout layout);
 
 /// Bytes the model's trims take in the kd-tree baseline, the unit of `--trim-memory 50%`.

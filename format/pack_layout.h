@@ -107,6 +107,10 @@ TRIMRAY_CONST uint kMaxBvhDepth = 48u; // nodes on a path from root to leaf; a r
 TRIMRAY_CONST uint kPieceCubic = 1u;
 TRIMRAY_CONST uint kEntryLast = 2u; // in a CellEntry's word: last of its cell
 
+// The largest float below 1. A query is clamped to [0, kUvBelowOne] in u and v: the rules below are half-open, so only
+// there do the domain's upper borders belong to the face as the lower ones do.
+TRIMRAY_CONST float kUvBelowOne = 0.99999994f;
+
 // CellEntry: a piece that passes through a mixed cell. Query q = (u, v) in a cell of grid index floor(uv * grid):
 //   inside = corner_inside  XOR over the cell's entries of  horizontal(e)  XOR  vertical(e)
 //   with piece ends (ua, va), (ub, vb), va <= vb; the path runs from q along +u to the cell's reference line, then

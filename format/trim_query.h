@@ -6,12 +6,9 @@
 
 namespace trimray {
 
-/// The largest single-precision number below 1: uv_face is clamped to [0, kUvBelowOne] before the cell is looked up, so
-/// that the domain's upper borders belong to the face as the lower ones do.
-inline constexpr float kUvBelowOne = 0x1.fffffep-1f;
-
 /// Returns whether (u, v) in uv_face lies inside the trims of image.faces[face]. Faces without cells (natural borders)
-/// answer true. Domain: any finite u, v, clamped to the domain. Exact but for points nearer than about 5e-7 to a loop.
+/// answer true. Domain: any finite u, v, clamped to [0, kUvBelowOne]. Exact but for points nearer than about 5e-7 to a
+/// loop.
 bool trim_inside(const PackImage& image, uint face, float u, float v);
 
 } // namespace trimray

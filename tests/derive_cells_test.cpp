@@ -131,6 +131,8 @@ TEST(derive_cells, any_orientation_of_nested_loops_is_the_same_region)
     }
 }
 
+static_assert(kUvBelowOne == 0x1.fffffep-1f);
+
 TEST(derive_cells, points_on_the_domains_border_belong_to_the_face_inside_it)
 {
     PackImage image;
