@@ -284,7 +284,7 @@ private:
                   fmt::format("{} elements of {} bytes do not make {} bytes", e.count, e.stride, e.decoded_bytes));
         if (e.codec == kCodecPlain && (e.stored_bytes != e.decoded_bytes || e.filter != kFilterNone))
             fault(3115, id, "plain, but stored and decoded size differ");
-        const bool has_columns = e.stride % 4 == 0 && e.stride <= 4 * kMaxFilterColumns;
+        const bool has_columns = e.stride > 0 && e.stride % 4 == 0 && e.stride <= 4 * kMaxFilterColumns;
         const uint64_t allowed =
             e.filter == kFilterNone || !has_columns ? 0 : ~uint64_t{0} >> (kMaxFilterColumns - e.stride / 4);
         if (e.filter == kFilterColumns && !has_columns)
