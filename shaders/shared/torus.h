@@ -70,12 +70,14 @@ FN_LARGE real cubic_root_between(real c3, real c2, real c1, real c0, real lo, re
     for (int i = 0; i < 24 && any_lane(moving); ++i) {
         ValueSlope f = polynomial_value(none, c3, c2, c1, c0, t);
         mask left = differ(f.value > 0.0f, rising); // the root is to the right of t
-        a = select(left, t, a);
-        b = select(left, b, t);
+        a = select(moving && left, t, a);
+        b = select(moving && !left, t, b);
         PRECISE real next = t - f.value / select(abs(f.slope) > 1e-30f, f.slope, real(1e-30f));
-        next = select(next > a && next < b, next, 0.5f * (a + b));
-        moving = moving && abs(next - t) > 1e-6f;
-        t = next;
+        next = select(next >= a && next <= b, next, 0.5f * (a + b));
+        // a lane that has settled stays: at the root the sign is noise, and would send it off to the middle of its bracket
+        mask still = moving && abs(next - t) > 1e-6f;
+        t = select(moving, next, t);
+        moving = still;
     }
     return select(found, t, hi);
 }
