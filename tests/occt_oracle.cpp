@@ -1,5 +1,6 @@
 #include "tests/occt_oracle_impl.h"
 
+#include <BRepAdaptor_Surface.hxx>
 #include <BRepBndLib.hxx>
 #include <BRepTools.hxx>
 #include <BRep_Builder.hxx>
@@ -15,6 +16,7 @@
 #include <TopoDS.hxx>
 #include <TopoDS_Shape.hxx>
 #include <gp_Lin.hxx>
+#include <gp_Torus.hxx>
 #include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
 
@@ -121,6 +123,18 @@ Box face_box(const TopoDS_Face& face, const gp_Trsf& to_world)
 {
     Bnd_Box kernel_box;
     BRepBndLib::Add(face, kernel_box, false);
+    const BRepAdaptor_Surface surface(face);
+    if (surface.GetType() == GeomAbs_Torus) {
+        // the kernel's box of a torus over negative v can lack half of it: take the whole torus
+        const gp_Torus torus = surface.Torus();
+        const gp_XYZ center = torus.Location().XYZ(), axis = torus.Axis().Direction().XYZ();
+        gp_XYZ half;
+        for (int k = 1; k <= 3; ++k)
+            half.SetCoord(k, torus.MajorRadius() * std::sqrt(std::max(0.0, 1 - axis.Coord(k) * axis.Coord(k))) +
+                                 torus.MinorRadius());
+        kernel_box.Add(gp_Pnt(center - half));
+        kernel_box.Add(gp_Pnt(center + half));
+    }
     if (kernel_box.IsVoid())
         return {};
     kernel_box = kernel_box.Transformed(to_world);
