@@ -38,6 +38,9 @@ namespace trimray::kernel {
 namespace {
 
 constexpr double kInfiniteSide = 1e100; // the kernel writes 2e100
+// A cone this flat or flatter goes on as a spline: its two nappes lie so close that a quadratic in single precision
+// cannot tell their roots apart. 1e-2 already costs a digit in depth; files hold cones of 7e-7.
+constexpr double kFlatConeCosine = 0.02;
 constexpr double kTwoPi = 2 * std::numbers::pi;
 
 Vec3d vec(const gp_XYZ& p)
@@ -451,7 +454,9 @@ Result<ConvertedSurface> convert_surface(const TopoDS_Face& face, const Rect2d& 
         return result;
     result->uv_map.u.scale *= scale_u;
     result->uv_map.v.scale *= scale_v;
-    if (!options.native_surfaces && result->surface.kind != kKindBezier)
+    const bool flat_cone =
+        result->surface.kind == kKindCone && std::abs(std::cos(result->surface.half_angle)) < kFlatConeCosine;
+    if ((!options.native_surfaces && result->surface.kind != kKindBezier) || flat_cone)
         result = native_as_spline(*result, mapped_bounds(bounds, result->uv_map));
     const SplineSurface& s = result->surface.spline;
     if (std::max(s.degree_u, s.degree_v) > static_cast<int>(kMaxDegree))

@@ -6,7 +6,8 @@
 Each model (`.zst` ones are decompressed first) is packed, rendered from two sides as EXR with `--trim exact`, and the
 program occt_oracle casts the same rays. A row a model: share of rays that agree on hit or miss and on depth within 1e-5
 of the diagonal, disagreements by cause, and up to a few of those that nothing explains. Files that have a row are skipped.
-Exit code: 0 when every model reaches 99.99 % with nothing unexplained, 1 otherwise.
+Exit code: 0 when every model reaches 99.99 % of the rays on which the kernel does not contradict itself, with nothing
+unexplained; 1 otherwise.
 """
 
 import argparse
@@ -89,7 +90,7 @@ def check_model(path, tools, size, timeout, pictures, trim, error_px):
                tangent=total["tangent"], oracle=total["oracle"], unexplained=total["unexplained"],
                worst_error=f"{worst:.1e}", rays_per_second=f"{rate:.0f}", remark="; ".join(remarks[:4]))
     faults = []
-    if share < SHARE:
+    if total["agree"] < SHARE * (total["rays"] - total["oracle"]):  # where the kernel is not proved wrong
         faults.append("share")
     if total["unexplained"]:
         faults.append("unexplained")

@@ -11,6 +11,7 @@
 #include <TopExp.hxx>
 #include <TopTools_IndexedMapOfShape.hxx>
 #include <TopoDS.hxx>
+#include <gp_Ax2.hxx>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -26,6 +27,12 @@ Point along(const Ray& ray, double t)
     return {ray.origin[0] + t * ray.direction[0], ray.origin[1] + t * ray.direction[1],
             ray.origin[2] + t * ray.direction[2]};
 }
+
+// Faces widened by a tolerance in parameters reach farther where the parameters are stretched; beyond this share of the
+// diagonal no such excuse is taken.
+constexpr double kNearEdge = 1e-4;
+// Where a surface bends, a ray this flat dips under it by cos^2/2 of the radius of curvature only.
+constexpr double kGrazingCosine = 0.05;
 
 const char* kind_name(const TopoDS_Face& face)
 {
@@ -122,20 +129,16 @@ struct Explainer {
         return std::abs(normal.Normalized() * d);
     }
 
-    /// Six rays turned by the jitter about two axes: does any of the kernel's answers agree with ours?
-    bool jitter_agrees(const Ray& ray, double ours_mm) const
+    /// Six rays turned by `angle_rad` about two axes: does any of the kernel's answers agree with ours?
+    bool turned_agrees(const Ray& ray, double ours_mm, double angle_rad) const
     {
-        const int least = std::abs(ray.direction[0]) < std::abs(ray.direction[1])
-                              ? (std::abs(ray.direction[0]) < std::abs(ray.direction[2]) ? 0 : 2)
-                              : (std::abs(ray.direction[1]) < std::abs(ray.direction[2]) ? 1 : 2);
-        gp_Vec axis(least == 0, least == 1, least == 2);
         const gp_Vec d(ray.direction[0], ray.direction[1], ray.direction[2]);
-        const gp_Vec a = (d ^ axis).Normalized(), b = d ^ a;
+        const gp_Vec a = gp_Vec(gp_Ax2(gp_Pnt(), gp_Dir(d)).XDirection()), b = d ^ a;
         for (int k = 0; k < 6; ++k) {
-            const double angle = k * 1.0471975511965976; // 60 degrees
-            const gp_Vec turned =
-                (d + (a * std::cos(angle) + b * std::sin(angle)) * oracle.options.jitter_rad).Normalized();
-            const OracleHit hit = oracle.closest({ray.origin, {turned.X(), turned.Y(), turned.Z()}});
+            const double around = k * 1.0471975511965976; // 60 degrees
+            const gp_Vec turned = (d + (a * std::cos(around) + b * std::sin(around)) * angle_rad).Normalized();
+            const OracleHit hit =
+                oracle.closest({ray.origin, {turned.X(), turned.Y(), turned.Z()}}, oracle.options.boundary_tolerance);
             if (agrees(ours_mm, hit.distance_mm))
                 return true;
         }
@@ -186,6 +189,11 @@ struct Explainer {
                 }
             }
         }
+        const double nearest_mm = std::min(ours_mm, hit.distance_mm);
+        const auto grazes = [&](const PointOnFace& at) { // moved sideways by the tolerance, the ray gives our answer
+            return at.cos_incidence >= 0 && at.cos_incidence < kGrazingCosine &&
+                   turned_agrees(ray, ours_mm, on_face_mm / nearest_mm);
+        };
         const bool ours_on_face = our_face >= 0 && at_ours.face_distance_mm <= on_face_mm;
 
         // 1. within an edge's tolerance
@@ -197,6 +205,12 @@ struct Explainer {
             record(our_face, at_ours);
             found.cause = Cause::Edge;
             found.why = "our hit lies within an edge's tolerance";
+        } else if (oracle.options.boundary_tolerance &&
+                   std::min(at_oracle.edge_distance_mm, at_ours.edge_distance_mm) <= kNearEdge * diagonal_mm &&
+                   agrees(ours_mm, oracle.closest(ray, false).distance_mm)) {
+            record(hit.hit() ? hit.face : our_face, hit.hit() ? at_oracle : at_ours);
+            found.cause = Cause::Edge;
+            found.why = "near an edge, and the kernel agrees when it does not widen faces by their tolerance";
             // 2. grazing
         } else if (hit.hit() && hit.distance_mm < ours_mm + on_face_mm && at_oracle.cos_incidence >= 0 &&
                    at_oracle.cos_incidence < oracle.options.tangent_cosine) {
@@ -208,6 +222,10 @@ struct Explainer {
             record(our_face, at_ours);
             found.cause = Cause::Tangent;
             found.why = "the ray grazes the surface at our hit";
+        } else if (grazes(at_oracle) || (ours_on_face && grazes(at_ours))) {
+            record(grazes(at_oracle) ? hit.face : our_face, grazes(at_oracle) ? at_oracle : at_ours);
+            found.cause = Cause::Tangent;
+            found.why = "the ray grazes the surface, no deeper than the tolerance";
             // 3. the kernel against itself
         } else if (ours_on_face && ours_mm < hit.distance_mm) {
             record(our_face, at_ours);
@@ -217,7 +235,7 @@ struct Explainer {
             record(hit.face, at_oracle);
             found.cause = Cause::Oracle;
             found.why = "the oracle's hit is off its face by the kernel's projection";
-        } else if (jitter_agrees(ray, ours_mm)) {
+        } else if (turned_agrees(ray, ours_mm, oracle.options.jitter_rad)) {
             record(hit.hit() ? hit.face : our_face, hit.hit() ? at_oracle : at_ours);
             found.cause = Cause::Oracle;
             found.why = "the oracle agrees with us when the ray is turned by a jitter";
