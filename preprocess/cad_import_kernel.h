@@ -107,7 +107,11 @@ struct ConvertedSurface {
     UvMap uv_map;
 };
 
-/// Converts a face's surface, its location applied. `bounds` are the face's in the kernel's uv.
+/// True for surfaces of which only the part that a face needs is converted.
+bool conversion_needs_bounds(const TopoDS_Face& face, const ImportOptions& options);
+
+/// Converts a face's surface, its location applied. `bounds` are the face's in the kernel's uv, and are looked at only
+/// where conversion_needs_bounds.
 /// Fails: InvalidSurface, UnsupportedSurface, with the reason.
 Result<ConvertedSurface> convert_surface(const TopoDS_Face& face, const Rect2d& bounds, const ImportOptions& options,
                                          double tolerance_mm);
@@ -142,9 +146,11 @@ Result<ConvertedPcurve> convert_pcurve(const opencascade::handle<Geom2d_Curve>& 
 /// along u or v, else within 1e-7 of an arc. Fails: InvalidTrim.
 Result<ConvertedPcurve> map_pcurve(const ConvertedPcurve& pcurve, const UvMap& map);
 
-/// The face's loops in the walk's order, in the kernel's uv. `face` must be oriented forward.
+/// The face's loops in the walk's order, in the kernel's uv. `face` must be oriented forward. Edges without a pcurve
+/// are projected onto the surface, which changes the shape, so only where `may_project`; otherwise they are an error.
 /// Fails: InvalidTrim, with the reason.
-Result<std::vector<CadLoop>> collect_loops(const TopoDS_Face& face, const TopTools_IndexedMapOfShape& edges);
+Result<std::vector<CadLoop>> collect_loops(const TopoDS_Face& face, const TopTools_IndexedMapOfShape& edges,
+                                           bool may_project);
 
 /// Converts a part: faces, edges, and the faces that could not be converted.
 CadPart convert_part(const PartShape& source, uint32_t part_index, const ImportOptions& options,

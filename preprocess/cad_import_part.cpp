@@ -15,6 +15,8 @@
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
+#include <tbb/parallel_for.h>
+#include <variant>
 
 namespace trimray::kernel {
 namespace {
@@ -29,16 +31,16 @@ Rect2d uv_bounds(const TopoDS_Face& face)
 }
 
 Result<CadFace> convert_face(const TopoDS_Face& face, const TopTools_IndexedMapOfShape& edges,
-                             const ImportOptions& options, double tolerance_mm)
+                             const ImportOptions& options, double tolerance_mm, bool may_project)
 {
     const TopoDS_Face forward = TopoDS::Face(face.Oriented(TopAbs_FORWARD));
     CadFace out;
     out.reversed = face.Orientation() == TopAbs_REVERSED;
     out.tolerance_mm = BRep_Tool::Tolerance(face);
-    Result<std::vector<CadLoop>> loops = collect_loops(forward, edges);
+    Result<std::vector<CadLoop>> loops = collect_loops(forward, edges, may_project);
     if (!loops)
         return loops.error();
-    const Rect2d bounds = uv_bounds(forward);
+    const Rect2d bounds = conversion_needs_bounds(forward, options) ? uv_bounds(forward) : Rect2d();
     Result<ConvertedSurface> surface = convert_surface(forward, bounds, options, tolerance_mm);
     if (!surface)
         return surface.error();
@@ -103,22 +105,35 @@ CadPart convert_part(const PartShape& source, uint32_t part_index, const ImportO
         out.smooth = BRep_Tool::MaxContinuity(edge) >= GeomAbs_G1;
         part.edges.push_back(out);
     }
-    for (int i = 1; i <= faces.Extent(); ++i) {
-        const TopoDS_Face face = TopoDS::Face(faces(i));
-        const auto face_in_part = static_cast<uint32_t>(i - 1);
-        const std::string name = source.names.IsBound(face) ? source.names.Find(face) : std::string();
+
+    // each face on its own, on all cores; what needs the shape changed (a missing pcurve) is tried again alone
+    using Outcome = std::variant<std::monostate, CadFace, std::string>;
+    std::vector<Outcome> outcomes(static_cast<size_t>(faces.Extent()));
+    const auto convert = [&](size_t i, bool may_project) {
         std::optional<Result<CadFace>> converted;
-        const auto failure = failure_of([&] { converted = convert_face(face, edges, options, tolerance_mm); });
-        if (failure) {
-            dropped.push_back({part_index, face_in_part, name, *failure});
+        const auto failure = failure_of([&] {
+            converted =
+                convert_face(TopoDS::Face(faces(static_cast<int>(i) + 1)), edges, options, tolerance_mm, may_project);
+        });
+        if (failure)
+            outcomes[i] = *failure;
+        else if (!*converted)
+            outcomes[i] = fmt::format("{}: {}", converted->error().where, converted->error().detail);
+        else
+            outcomes[i] = std::move(**converted);
+    };
+    tbb::parallel_for(size_t{0}, outcomes.size(), [&](size_t i) { convert(i, false); });
+    for (size_t i = 0; i < outcomes.size(); ++i) {
+        if (std::holds_alternative<std::string>(outcomes[i]))
+            convert(i, true);
+        const TopoDS_Shape& face = faces(static_cast<int>(i) + 1);
+        const auto face_in_part = static_cast<uint32_t>(i);
+        const std::string name = source.names.IsBound(face) ? source.names.Find(face) : std::string();
+        if (const std::string* reason = std::get_if<std::string>(&outcomes[i])) {
+            dropped.push_back({part_index, face_in_part, name, *reason});
             continue;
         }
-        if (!*converted) {
-            const Error& error = converted->error();
-            dropped.push_back({part_index, face_in_part, name, fmt::format("{}: {}", error.where, error.detail)});
-            continue;
-        }
-        CadFace& out = **converted;
+        CadFace& out = std::get<CadFace>(outcomes[i]);
         out.face_in_part = face_in_part;
         out.name = name;
         out.color_rgba = colors.IsBound(face) ? std::optional(colors.Find(face)) : source.color_rgba;

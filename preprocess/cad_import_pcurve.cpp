@@ -98,11 +98,12 @@ std::vector<CadLoop> chain(std::vector<CadEdgeUse> uses)
     return loops;
 }
 
-Result<CadEdgeUse> edge_use(const TopoDS_Edge& edge, const TopoDS_Face& face, const TopTools_IndexedMapOfShape& edges)
+Result<CadEdgeUse> edge_use(const TopoDS_Edge& edge, const TopoDS_Face& face, const TopTools_IndexedMapOfShape& edges,
+                            bool may_project)
 {
     double first = 0, last = 0;
     Handle(Geom2d_Curve) curve = BRep_Tool::CurveOnSurface(edge, face, first, last);
-    if (curve.IsNull()) {
+    if (curve.IsNull() && may_project) {
         ShapeFix_Edge fix;
         if (fix.FixAddPCurve(edge, face, false, BRep_Tool::Tolerance(edge)))
             curve = BRep_Tool::CurveOnSurface(edge, face, first, last);
@@ -184,7 +185,8 @@ Result<ConvertedPcurve> convert_pcurve(const Handle(Geom2d_Curve) & source, doub
     return out;
 }
 
-Result<std::vector<CadLoop>> collect_loops(const TopoDS_Face& face, const TopTools_IndexedMapOfShape& edges)
+Result<std::vector<CadLoop>> collect_loops(const TopoDS_Face& face, const TopTools_IndexedMapOfShape& edges,
+                                           bool may_project)
 {
     std::vector<CadLoop> loops;
     for (TopoDS_Iterator it(face, false); it.More(); it.Next()) {
@@ -202,7 +204,7 @@ Result<std::vector<CadLoop>> collect_loops(const TopoDS_Face& face, const TopToo
         const bool complete = walked.size() == all.size();
         std::vector<CadEdgeUse> uses;
         for (const TopoDS_Edge& edge : complete ? walked : all) {
-            Result<CadEdgeUse> use = edge_use(edge, face, edges);
+            Result<CadEdgeUse> use = edge_use(edge, face, edges, may_project);
             if (!use)
                 return use.error();
             uses.push_back(std::move(*use));

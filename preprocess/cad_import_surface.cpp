@@ -8,9 +8,11 @@
 #include <Geom_BSplineSurface.hxx>
 #include <Geom_BezierCurve.hxx>
 #include <Geom_BezierSurface.hxx>
+#include <Geom_BoundedSurface.hxx>
 #include <Geom_Circle.hxx>
 #include <Geom_ConicalSurface.hxx>
 #include <Geom_CylindricalSurface.hxx>
+#include <Geom_ElementarySurface.hxx>
 #include <Geom_Line.hxx>
 #include <Geom_OffsetSurface.hxx>
 #include <Geom_Plane.hxx>
@@ -431,6 +433,19 @@ Result<ConvertedSurface> convert(const Handle(Geom_Surface) & surface, const Rec
 }
 
 } // namespace
+
+bool conversion_needs_bounds(const TopoDS_Face& face, const ImportOptions& options)
+{
+    TopLoc_Location location;
+    Handle(Geom_Surface) surface = BRep_Tool::Surface(face, location);
+    while (const auto trimmed = Handle(Geom_RectangularTrimmedSurface)::DownCast(surface))
+        surface = trimmed->BasisSurface();
+    if (surface.IsNull())
+        return false;
+    const bool spline = surface->IsKind(STANDARD_TYPE(Geom_BoundedSurface));
+    const bool elementary = surface->IsKind(STANDARD_TYPE(Geom_ElementarySurface));
+    return !spline && !(elementary && options.native_surfaces);
+}
 
 Result<ConvertedSurface> convert_surface(const TopoDS_Face& face, const Rect2d& bounds, const ImportOptions& options,
                                          double tolerance_mm)
