@@ -15,10 +15,6 @@ SHARED_OPEN
 // Data comes through fetch_cell, fetch_entry_word, fetch_entry_eta, fetch_trim_point (index in points) and
 // fetch_sdf_word.
 
-// The largest number below 1: uv_face is clamped to it, so that the domain's upper borders belong to the face as the
-// lower ones do
-const scalar kUvBelowOne = 0.99999994f;
-
 // The constants of one face
 struct TrimFace {
     uint columns;
