@@ -30,6 +30,7 @@ constexpr float kDomainSlack = 4e-6f;
 // Newton may end outside of its patch by this much of uv_patch, so that neighbours overlap
 constexpr float kUvOverlap = 1e-5f;
 constexpr int kNewtonSteps = 12;
+constexpr float kSmallResidual = 4e-6f; // patch units: the rounding of a point with |q| about 1
 
 class BlockTracer {
 public:
@@ -250,49 +251,83 @@ private:
         const RayPlanes planes = ray_planes(origin, direction);
         // a step from this far ends within its square, times the leaf's curvature: 6e-8 is below rounding
         const scalar enough = min(max(job_.error_px * target.view.pixel, 1e-6f), 2.4e-4f);
-        real2 uv = middle;
-        mask settled = mask(false);
+        const NewtonPatch newton{patch.first_control_point, degree_u, degree_v, rational, enough, box, planes};
+        const mask grazing = newton_from(target, newton, middle, moving, origin, direction, hit);
+        // where a leaf may hold more roots than one: the rest of its starts, for the rays that this concerns
+        mask again = (box.flags & kLeafFlagged) != 0 ? moving : grazing;
+        if (!any_lane(again))
+            return;
+        constexpr float kStarts[4][2] = {{0.1f, 0.1f}, {0.9f, 0.9f}, {0.1f, 0.9f}, {0.9f, 0.1f}};
+        for (const auto& [s, t] : kStarts) {
+            const real2 start =
+                scalar2(box.uv_lo.x + s * (box.uv_hi.x - box.uv_lo.x), box.uv_lo.y + t * (box.uv_hi.y - box.uv_lo.y));
+            newton_from(target, newton, start, again, origin, direction, hit);
+        }
+    }
+
+    struct NewtonPatch {
+        uint first_control_point;
+        int degree_u, degree_v;
+        bool rational;
+        scalar enough; // residual of the last step but one, patch units
+        const LeafBox& box;
+        const RayPlanes& planes;
+    };
+
+    /// Newton from one start in the lanes `moving`; offers what it finds. Returns the lanes that met the surface at a
+    /// grazing angle on their way's end.
+    HWY_ATTR HWY_NOINLINE mask newton_from(Target& target, const NewtonPatch& newton, real2 uv, mask moving,
+                                           real3 origin, real3 direction, PacketHit& hit)
+    {
+        const LeafBox& box = newton.box;
+        const RayPlanes& planes = newton.planes;
+        mask settled = mask(false), grazing = mask(false), within_pixel = mask(false);
         for (int step = 0; step < kNewtonSteps && any_lane(moving); ++step) {
-            const SurfacePoint s = evaluate(patch.first_control_point, degree_u, degree_v, rational, uv);
+            const SurfacePoint s = evaluate(newton, uv);
             const NewtonStep next = newton_step(s, planes, uv);
             ++work_.newton_steps;
-            const mask close = next.residual <= enough;
+            // near a double root the steps only halve the residual, so there it must be small before the last one
+            const mask close = next.residual <= select(next.grazing, real(kSmallResidual), real(newton.enough));
+            within_pixel = select(moving, next.residual <= newton.enough, within_pixel);
             const real2 to = real2(kept_near_leaf(next.uv.x, box.uv_lo.x, box.uv_hi.x),
                                    kept_near_leaf(next.uv.y, box.uv_lo.y, box.uv_hi.y));
             // at the bounds of its reach, and drawn outwards: the root is not here
             const mask stuck = next.singular || (to.x == uv.x && to.y == uv.y);
             uv = select(moving, to, uv);
+            grazing = select(moving, next.grazing, grazing);
             settled = settled || (moving && close);
             moving = moving && !close && !stuck;
         }
-        hit.doubt = hit.doubt || moving;
+        grazing = grazing || moving;
+        settled = settled || (moving && within_pixel); // a tangent ray
+        hit.doubt = hit.doubt || (moving && !within_pixel);
         const mask inside = settled && abs(uv.x - 0.5f) <= 0.5f + kUvOverlap && abs(uv.y - 0.5f) <= 0.5f + kUvOverlap;
         if (!any_lane(inside))
-            return;
-        SurfacePoint s = evaluate(patch.first_control_point, degree_u, degree_v, rational, uv);
+            return grazing;
+        SurfacePoint s = evaluate(newton, uv);
         const real r1 = dot(planes.n1, s.p) + planes.d1, r2 = dot(planes.n2, s.p) + planes.d2;
         const real residual = sqrt(r1 * r1 + r2 * r2);
         const real t = dot(s.p - origin, direction) / dot(direction, direction);
-        const mask near = inside && residual <= max(enough, 4e-6f) && in_range(target, t, hit);
+        const mask near = inside && residual <= max(newton.enough, kSmallResidual) && in_range(target, t, hit);
         if (!any_lane(near))
-            return;
+            return grazing;
         real3 normal = cross(s.du, s.dv);
         const mask flat = dot(normal, normal) <= 1e-10f * dot(s.du, s.du) * dot(s.dv, s.dv) ||
                           dot(s.du, s.du) <= 1e-10f * dot(s.dv, s.dv) || dot(s.dv, s.dv) <= 1e-10f * dot(s.du, s.du);
         if (any_lane(near && flat)) {
             // a pole or a degenerate side: the normal a little way inside
             constexpr float kInwards = 1.0f / 2048;
-            const real2 inner = uv + real2(0.5f - uv.x, 0.5f - uv.y) * real(kInwards);
-            s = evaluate(patch.first_control_point, degree_u, degree_v, rational, inner);
+            s = evaluate(newton, uv + real2(0.5f - uv.x, 0.5f - uv.y) * real(kInwards));
             normal = select(flat, cross(s.du, s.dv), normal);
         }
         offer(target, near, t, uv, normal, hit);
+        return grazing;
     }
 
-    HWY_ATTR HWY_NOINLINE SurfacePoint evaluate(uint first, int degree_u, int degree_v, bool rational, real2 uv) const
+    HWY_ATTR HWY_NOINLINE SurfacePoint evaluate(const NewtonPatch& patch, real2 uv) const
     {
         const FetchSource& source = source_;
-        return bezier_point(FETCH_PASS first, degree_u, degree_v, rational, uv);
+        return bezier_point(FETCH_PASS patch.first_control_point, patch.degree_u, patch.degree_v, patch.rational, uv);
     }
 
     /// Takes the roots that lie in the face's domain and inside its trims.

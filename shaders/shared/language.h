@@ -110,7 +110,7 @@ FN real3 project(scalar3 axis_x, scalar3 axis_y, scalar3 axis_z, real3 v)
                  axis_z.x * v.x + axis_z.y * v.y + axis_z.z * v.z);
 }
 
-// The angle of (x, y) in [-pi, pi], within 2.5e-7; 0 at the origin. Polynomial of atan on [0, tan(pi/8)], as Cephes
+// The angle of (x, y) in [-pi, pi], within 3e-7; 0 at the origin. Polynomial of atan on [0, tan(pi/8)], as Cephes
 // atanf, with one division: atan(a) = pi/4 + atan((a - 1) / (a + 1)).
 FN real angle_of(real x, real y)
 {

@@ -34,10 +34,15 @@ FN RayPlanes ray_planes(real3 origin, real3 direction)
     return planes;
 }
 
+// Sine of the angle between a ray and a surface below which a leaf that turns by LeafOptions.max_turning_rad can hold
+// two roots.
+const scalar kGrazing = 0.15f;
+
 struct NewtonStep {
     real2 uv;      // after the step; may leave [0,1]^2, the caller decides
     real residual; // before the step: distance of the point from the ray, patch units
     mask singular; // the step was not taken
+    mask grazing;  // the ray and the surface meet at less than kGrazing: more roots may be near
 };
 
 // One step. Source: Kajiya 1982; Cramer's rule.
@@ -54,6 +59,7 @@ FN NewtonStep newton_step(SurfacePoint s, RayPlanes ray, real2 uv)
     PRECISE real noise = 8.0f * kRounding * sqrt((a1 * a1 + a2 * a2) * (b1 * b1 + b2 * b2));
     NewtonStep next;
     next.singular = abs(det) <= noise;
+    next.grazing = det * det <= kGrazing * kGrazing * dot(s.du, s.du) * dot(s.dv, s.dv);
     PRECISE real per_det = 1.0f / select(next.singular, real(1.0f), det);
     next.residual = sqrt(r1 * r1 + r2 * r2);
     real2 moved = real2(uv.x - (b2 * r1 - b1 * r2) * per_det, uv.y - (a1 * r2 - a2 * r1) * per_det);

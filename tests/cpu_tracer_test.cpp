@@ -1,0 +1,399 @@
+// The CPU tracer against the surfaces themselves, evaluated in double, and against itself on every instruction set.
+#include "format/trim_query.h"
+#include "runtime/tracer.h"
+#include "tests/record_surface.h"
+#include "tests/traced_scenes.h"
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <random>
+#include <vector>
+
+namespace trimray {
+namespace {
+
+using Point = std::array<double, 3>;
+
+struct Traced {
+    Frame frame;
+    RenderStats stats;
+};
+
+Traced render(const std::shared_ptr<const Scene>& scene, const Camera& camera, uint32_t width = 160,
+              uint32_t height = 120, TrimMode trim = TrimMode::Exact, const std::string& instruction_set = "")
+{
+    auto tracer = make_cpu_tracer(scene, instruction_set);
+    EXPECT_TRUE(tracer.ok());
+    RenderOptions options;
+    options.width = width;
+    options.height = height;
+    options.camera = camera;
+    options.trim = trim;
+    options.threads = 2;
+    Traced traced;
+    Result<Frame> frame = (*tracer)->render(options, traced.stats);
+    EXPECT_TRUE(frame.ok());
+    traced.frame = std::move(*frame);
+    return traced;
+}
+
+Camera looking(Point eye, Point target, double fov_deg)
+{
+    return {eye, target, {0, 0, 1}, fov_deg};
+}
+
+const Camera kOverview = looking({18, -26, 19}, {0, 0, 0}, 40);
+
+Point direction_of(const CameraRays& rays, double x, double y)
+{
+    Point d;
+    double size = 0;
+    for (size_t i = 0; i < 3; ++i) {
+        d[i] = rays.corner[i] + x * rays.step_x[i] + y * rays.step_y[i];
+        size += d[i] * d[i];
+    }
+    for (double& c : d)
+        c /= std::sqrt(size);
+    return d;
+}
+
+size_t hits_of(const Frame& frame)
+{
+    size_t hits = 0;
+    for (const int32_t face : frame.face)
+        hits += face >= 0;
+    return hits;
+}
+
+template <class T>
+bool same_bits(const std::vector<T>& a, const std::vector<T>& b)
+{
+    return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(T)) == 0;
+}
+
+/// S(uv) and its unit normal in world mm, of the hit of a pixel; the part stands where it is.
+void surface_at(const PackImage& image, const Frame& frame, size_t pixel, Point& point, Point& normal)
+{
+    const FaceRecord& face = image.faces[size_t(frame.face[pixel])];
+    const PatchRecord& patch = image.patches[face.first_patch];
+    double uv[2];
+    for (size_t i = 0; i < 2; ++i) {
+        const double at = (frame.uv[2 * pixel + i] - face.domain_lo[i]) / (face.domain_hi[i] - face.domain_lo[i]);
+        uv[i] = (at - patch.uv_offset[i]) / patch.uv_scale[i];
+    }
+    const auto part_mm = [&](double u, double v) {
+        const Point q = test::point_of(patch, image.control_points.data(), u, v);
+        Point p;
+        for (size_t c = 0; c < 3; ++c)
+            p[c] = image.parts[0].scale_mm *
+                   (double(patch.origin_hi[c]) + patch.origin_lo[c] +
+                    patch.scale * (patch.axis_x[c] * q[0] + patch.axis_y[c] * q[1] + patch.axis_z[c] * q[2]));
+        return p;
+    };
+    point = part_mm(uv[0], uv[1]);
+    constexpr double kStep = 1e-5;
+    const Point u1 = part_mm(uv[0] + kStep, uv[1]), u0 = part_mm(uv[0] - kStep, uv[1]);
+    const Point v1 = part_mm(uv[0], uv[1] + kStep), v0 = part_mm(uv[0], uv[1] - kStep);
+    const Point du{u1[0] - u0[0], u1[1] - u0[1], u1[2] - u0[2]}, dv{v1[0] - v0[0], v1[1] - v0[1], v1[2] - v0[2]};
+    normal = {du[1] * dv[2] - du[2] * dv[1], du[2] * dv[0] - du[0] * dv[2], du[0] * dv[1] - du[1] * dv[0]};
+    const double size = std::sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2]);
+    for (double& c : normal)
+        c *= ((face.flags & kFaceReversed) != 0 ? -1 : 1) / size;
+}
+
+TEST(cpu_tracer, gives_the_same_bits_on_every_instruction_set)
+{
+    const auto scene = all_kinds().finish();
+    const Traced first = render(scene, kOverview);
+    EXPECT_GT(hits_of(first.frame), 4000u);
+    int compared = 0;
+    for (const char* set : {"avx512", "avx2", "sse4"}) {
+        if (!make_cpu_tracer(scene, set).ok())
+            continue;
+        for (const TrimMode trim : {TrimMode::Exact, TrimMode::Sdf}) {
+            const Traced base = render(scene, kOverview, 157, 93, trim);
+            const Traced other = render(scene, kOverview, 157, 93, trim, set);
+            EXPECT_TRUE(same_bits(base.frame.rgba, other.frame.rgba)) << set;
+            EXPECT_TRUE(same_bits(base.frame.depth_mm, other.frame.depth_mm)) << set;
+            EXPECT_TRUE(same_bits(base.frame.normal, other.frame.normal)) << set;
+            EXPECT_TRUE(same_bits(base.frame.uv, other.frame.uv)) << set;
+            EXPECT_TRUE(same_bits(base.frame.face, other.frame.face)) << set;
+            EXPECT_TRUE(same_bits(base.frame.certified, other.frame.certified)) << set;
+            EXPECT_EQ(base.stats.work.newton_steps, other.stats.work.newton_steps) << set;
+            EXPECT_EQ(base.stats.work.leaf_visits, other.stats.work.leaf_visits) << set;
+            ++compared;
+        }
+    }
+    EXPECT_GE(compared, 2);
+    EXPECT_FALSE(make_cpu_tracer(scene, "mmx").ok());
+}
+
+TEST(cpu_tracer, depth_uv_and_normal_belong_to_the_surface)
+{
+    const auto scene = all_kinds().finish();
+    const PackImage& image = scene->pack.image;
+    const Frame frame = render(scene, kOverview).frame;
+    const CameraRays rays = camera_rays(kOverview, frame.width, frame.height);
+    std::vector<int> seen(image.faces.size()), complained(image.faces.size());
+    double worst_mm = 0, worst_off_ray = 0, worst_cosine = 1;
+    for (uint32_t y = 0; y < frame.height; ++y) {
+        for (uint32_t x = 0; x < frame.width; ++x) {
+            const size_t pixel = size_t(y) * frame.width + x;
+            if (frame.face[pixel] < 0)
+                continue;
+            ++seen[size_t(frame.face[pixel])];
+            const Point d = direction_of(rays, x + 0.5, y + 0.5);
+            Point surface, normal;
+            surface_at(image, frame, pixel, surface, normal);
+            // S(uv) from the ray, and along it
+            Point off;
+            double along = 0, cosine = 0, off2 = 0;
+            for (size_t i = 0; i < 3; ++i) {
+                off[i] = surface[i] - rays.eye[i];
+                along += off[i] * d[i];
+                cosine += normal[i] * frame.normal[3 * pixel + i];
+            }
+            for (size_t i = 0; i < 3; ++i)
+                off2 += (off[i] - along * d[i]) * (off[i] - along * d[i]);
+            double facing = 0;
+            for (size_t i = 0; i < 3; ++i)
+                facing += normal[i] * d[i];
+            if (std::sqrt(off2) > 2e-5 && !complained[size_t(frame.face[pixel])]++)
+                ADD_FAILURE() << "face " << frame.face[pixel] << " is " << std::sqrt(off2) << " mm off its ray";
+            worst_off_ray = std::max(worst_off_ray, std::sqrt(off2));
+            worst_cosine = std::min(worst_cosine, cosine);
+            // rounding of uv moves S along the surface; on a grazing ray that is depth
+            worst_mm = std::max(worst_mm, std::abs(along - frame.depth_mm[pixel]) * std::abs(facing));
+        }
+    }
+    for (size_t face = 0; face < seen.size(); ++face)
+        EXPECT_GT(seen[face], 50) << "face " << face;
+    // the part is 20 mm, uv is stored to 2^-24 of a turn
+    EXPECT_LT(worst_mm, 2e-5);
+    EXPECT_LT(worst_off_ray, 2e-5);
+    EXPECT_GT(worst_cosine, std::cos(0.1 * std::numbers::pi / 180));
+}
+
+TEST(cpu_tracer, a_pixel_is_a_whole_hit_or_a_whole_miss)
+{
+    const Frame frame = render(all_kinds().finish(), kOverview, 101, 67).frame;
+    for (size_t i = 0; i < frame.face.size(); ++i) {
+        const bool hit = frame.face[i] >= 0;
+        EXPECT_EQ(hit, frame.instance[i] >= 0);
+        EXPECT_EQ(hit, std::isfinite(frame.depth_mm[i]));
+        EXPECT_EQ(frame.rgba[4 * i + 3], hit ? 1.0f : 0.0f);
+        double size = 0;
+        for (size_t c = 0; c < 3; ++c) {
+            ASSERT_TRUE(std::isfinite(frame.rgba[4 * i + c]));
+            size += double(frame.normal[3 * i + c]) * frame.normal[3 * i + c];
+        }
+        EXPECT_NEAR(size, hit ? 1 : 0, 1e-6);
+        ASSERT_TRUE(std::isfinite(frame.uv[2 * i]) && std::isfinite(frame.uv[2 * i + 1]));
+    }
+}
+
+TEST(cpu_tracer, what_it_keeps_lies_inside_the_trims)
+{
+    const auto scene = all_kinds().finish();
+    const PackImage& image = scene->pack.image;
+    const Frame frame = render(scene, kOverview, 320, 240).frame;
+    int asked = 0, wrong = 0;
+    for (size_t i = 0; i < frame.face.size(); ++i) {
+        if (frame.face[i] < 0)
+            continue;
+        const FaceRecord& face = image.faces[size_t(frame.face[i])];
+        float uv[2];
+        for (size_t c = 0; c < 2; ++c)
+            uv[c] = float((frame.uv[2 * i + c] - face.domain_lo[c]) / (face.domain_hi[c] - face.domain_lo[c]));
+        ++asked;
+        wrong += !trim_inside(image, uint(frame.face[i]), uv[0], uv[1]);
+    }
+    EXPECT_GT(asked, 10000);
+    EXPECT_LE(wrong, 2); // uv made a trip through uv_file's rounding
+}
+
+TEST(cpu_tracer, the_texture_differs_from_the_cells_only_near_the_border)
+{
+    const auto scene = all_kinds().finish();
+    const Frame exact = render(scene, kOverview, 320, 240).frame;
+    const Traced sdf = render(scene, kOverview, 320, 240, TrimMode::Sdf);
+    EXPECT_EQ(sdf.stats.trim, TrimMode::Sdf);
+    size_t differ = 0;
+    for (size_t i = 0; i < exact.face.size(); ++i)
+        differ += exact.face[i] != sdf.frame.face[i];
+    EXPECT_GT(differ, 0u); // the texture is not the cells
+    EXPECT_LT(double(differ), 0.01 * double(hits_of(exact)));
+}
+
+TEST(cpu_tracer, says_which_trim_modes_it_has)
+{
+    auto tracer = make_cpu_tracer(all_kinds().finish());
+    ASSERT_TRUE(tracer.ok());
+    RenderOptions options;
+    RenderStats stats;
+    for (const TrimMode mode : {TrimMode::Hybrid, TrimMode::Kd}) {
+        options.trim = mode;
+        const Result<Frame> frame = (*tracer)->render(options, stats);
+        ASSERT_FALSE(frame.ok());
+        EXPECT_EQ(frame.error().code, ErrorCode::UnsupportedPackFeature);
+        EXPECT_NE(frame.error().detail.find("exact"), std::string::npos);
+    }
+}
+
+TEST(cpu_tracer, a_mirrored_instance_is_the_mirror_image)
+{
+    const auto straight = all_kinds().finish();
+    TracedScene model = all_kinds();
+    model.place({-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0});
+    const auto mirrored = model.finish();
+    Camera camera = kOverview;
+    const Frame a = render(straight, camera).frame;
+    camera.eye[0] = -camera.eye[0];
+    const Frame b = render(mirrored, camera).frame;
+    size_t same = 0;
+    for (uint32_t y = 0; y < a.height; ++y) {
+        for (uint32_t x = 0; x < a.width; ++x) {
+            const size_t i = size_t(y) * a.width + x, j = size_t(y) * a.width + (a.width - 1 - x);
+            if (a.face[i] != b.face[j])
+                continue;
+            ++same;
+            if (a.face[i] < 0)
+                continue;
+            EXPECT_NEAR(a.depth_mm[i], b.depth_mm[j], 2e-4);
+            EXPECT_NEAR(a.normal[3 * i], -b.normal[3 * j], 2e-3);
+            EXPECT_NEAR(a.normal[3 * i + 1], b.normal[3 * j + 1], 2e-3);
+            EXPECT_NEAR(a.normal[3 * i + 2], b.normal[3 * j + 2], 2e-3);
+        }
+    }
+    EXPECT_GE(same, a.face.size() - 5);
+}
+
+TEST(cpu_tracer, sees_the_same_from_a_million_sizes_away)
+{
+    const auto scene = all_kinds().finish();
+    const auto from = [&](double sizes) {
+        const Point along{0.5, -0.7, 0.51};
+        const double distance = 20 * sizes;
+        return render(scene, looking({along[0] * distance, along[1] * distance, along[2] * distance}, {0, 0, 0},
+                                     2 * std::atan(14 / distance) * 180 / std::numbers::pi))
+            .frame;
+    };
+    const Frame near = from(1e5), far = from(1e6);
+    EXPECT_GT(hits_of(near), 4000u);
+    size_t differ = 0;
+    double worst_cosine = 1;
+    for (size_t i = 0; i < near.face.size(); ++i) {
+        if (near.face[i] != far.face[i]) {
+            ++differ;
+            continue;
+        }
+        if (near.face[i] < 0)
+            continue;
+        double cosine = 0;
+        for (size_t c = 0; c < 3; ++c)
+            cosine += double(near.normal[3 * i + c]) * far.normal[3 * i + c];
+        worst_cosine = std::min(worst_cosine, cosine);
+    }
+    EXPECT_LE(differ, 8u); // borders within the perspective's own difference, 1e-5 of the size
+    EXPECT_GT(worst_cosine, 0.999);
+}
+
+TEST(cpu_tracer, from_inside_a_closed_surface_there_is_no_way_out)
+{
+    constexpr double kPi = std::numbers::pi;
+    TracedScene ball;
+    ball.add(kKindSphere, 0.9, {0, 0, 0}, {kPi, kPi / 2});
+    TracedScene ring;
+    ring.add(kKindTorus, 0.6, {0, 0, 0}, {kPi, kPi}).param[1] = 0.4f;
+    for (const Point target : {Point{1, 0.3, 0.2}, Point{-1, 0.1, 0}, Point{0, 0.01, 1}, Point{0, 1, -1}}) {
+        const Frame in_ball = render(ball.finish(), looking({0.5, 0.4, 0.3}, target, 110)).frame;
+        EXPECT_EQ(hits_of(in_ball), in_ball.face.size());
+        Point beside{6.0 + target[0], target[1], target[2]};
+        const Frame in_ring = render(ring.finish(), looking({6, 0.1, 0.2}, beside, 110)).frame;
+        EXPECT_EQ(hits_of(in_ring), in_ring.face.size());
+    }
+}
+
+/// 12 x 12 bilinear patches that share their corners, in an area of +-10 mm.
+TracedScene patch_grid(double height, uint32_t seed)
+{
+    constexpr int kCount = 12;
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> any(-height, height);
+    double z[kCount + 1][kCount + 1];
+    for (auto& row : z)
+        for (double& value : row)
+            value = any(random);
+    TracedScene scene;
+    scene.with_textures = false;
+    for (int i = 0; i < kCount; ++i) {
+        for (int j = 0; j < kCount; ++j) {
+            const double step = 2.0 / kCount, x = -1 + step * i, y = -1 + step * j;
+            scene.add_bezier(1, 1, false, step, {x + step / 2, y + step / 2, 0});
+            for (int a = 0; a < 2; ++a)
+                for (int b = 0; b < 2; ++b)
+                    scene.image.control_points.insert(scene.image.control_points.end(),
+                                                      {float(a - 0.5), float(b - 0.5), float(z[i + a][j + b] / step)});
+        }
+    }
+    return scene;
+}
+
+TEST(cpu_tracer, patches_that_share_their_borders_leave_no_hole)
+{
+    // turned, so that borders run along no axis
+    const double c = std::cos(0.37), s = std::sin(0.37);
+    for (const double height : {0.0, 0.02}) {
+        TracedScene model = patch_grid(height, 7);
+        model.place({c, -s, 0, 0, s, c, 0, 0, 0, 0, 1, 0});
+        const auto scene = model.finish();
+        // from above, and nearly edge-on
+        for (const Point eye : {Point{1, 2, 12}, Point{-9.4, 0.7, 1.2}, Point{-3, 6, 0.6}}) {
+            const Camera camera = looking(eye, {0.3, 0.1, 0}, 30);
+            const Frame frame = render(scene, camera, 400, 300).frame;
+            const CameraRays rays = camera_rays(camera, frame.width, frame.height);
+            size_t asked = 0, holes = 0;
+            for (uint32_t y = 0; y < frame.height; ++y) {
+                for (uint32_t x = 0; x < frame.width; ++x) {
+                    const Point d = direction_of(rays, x + 0.5, y + 0.5);
+                    const double t = -eye[2] / d[2];
+                    const double px = eye[0] + t * d[0], py = eye[1] + t * d[1];
+                    // well inside of the square, whatever the heights do to where the ray meets it
+                    const double side = std::max(std::abs(c * px + s * py), std::abs(c * py - s * px));
+                    if (t <= 0 || side > (height > 0 ? 6 : 9.99))
+                        continue;
+                    ++asked;
+                    holes += frame.face[size_t(y) * frame.width + x] < 0;
+                }
+            }
+            EXPECT_GT(asked, 1000u);
+            EXPECT_EQ(holes, 0u) << "height " << height << " eye " << eye[2];
+        }
+    }
+}
+
+TEST(cpu_tracer, one_ray_meets_what_its_pixel_shows)
+{
+    const auto scene = all_kinds().finish();
+    const Frame frame = render(scene, kOverview).frame;
+    const CameraRays rays = camera_rays(kOverview, frame.width, frame.height);
+    std::mt19937 random(3);
+    int hits = 0;
+    for (int k = 0; k < 400; ++k) {
+        const uint32_t x = random() % frame.width, y = random() % frame.height;
+        const size_t pixel = size_t(y) * frame.width + x;
+        const RayHit hit = trace_ray(*scene, rays.eye, direction_of(rays, x + 0.5, y + 0.5));
+        EXPECT_EQ(hit.hit, frame.face[pixel] >= 0);
+        EXPECT_EQ(hit.face, frame.face[pixel]);
+        if (!hit.hit)
+            continue;
+        ++hits;
+        EXPECT_NEAR(hit.distance_mm, frame.depth_mm[pixel], 1e-4);
+    }
+    EXPECT_GT(hits, 50);
+    EXPECT_FALSE(trace_ray(*scene, {0, 0, 0}, {0, 0, 0}).hit);
+}
+
+} // namespace
+} // namespace trimray

@@ -1,0 +1,230 @@
+// The shared formulas, in lanes, against long double.
+#include "shaders/shared/language.h"
+#include "shaders/shared/precision.h"
+#include "shaders/shared/quadric.h"
+#include "shaders/shared/torus.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+#include <vector>
+
+HWY_BEFORE_NAMESPACE();
+namespace trimray {
+namespace HWY_NAMESPACE {
+namespace {
+
+struct Lanes {
+    alignas(64) float at[kLanes];
+};
+Lanes values(real a)
+{
+    Lanes lanes;
+    store(a, lanes.at);
+    return lanes;
+}
+
+TEST(formulas, angle_of_is_the_angle)
+{
+    std::mt19937 random(1);
+    std::normal_distribution<float> any;
+    double worst = 0;
+    for (int k = 0; k < 20000; ++k) {
+        Lanes x, y;
+        for (int i = 0; i < kLanes; ++i) {
+            x.at[i] = any(random) * std::ldexp(1.0f, int(random() % 40) - 20);
+            y.at[i] = any(random) * std::ldexp(1.0f, int(random() % 40) - 20);
+        }
+        const Lanes angle = values(angle_of(load(x.at), load(y.at)));
+        for (int i = 0; i < kLanes; ++i)
+            worst = std::max(worst, std::abs(double(angle.at[i]) - std::atan2(double(y.at[i]), double(x.at[i]))));
+    }
+    EXPECT_LT(worst, 3e-7);
+    EXPECT_EQ(values(angle_of(real(0.0f), real(0.0f))).at[0], 0.0f);
+    EXPECT_EQ(values(angle_of(real(1.0f), real(0.0f))).at[0], 0.0f);
+    EXPECT_FLOAT_EQ(values(angle_of(real(-1.0f), real(0.0f))).at[0], kPi);
+    EXPECT_FLOAT_EQ(values(angle_of(real(0.0f), real(-2.0f))).at[0], -kPi / 2);
+}
+
+struct RandomRays {
+    std::mt19937 random{5};
+    Lanes o[3], d[3];
+
+    void next(float reach)
+    {
+        std::uniform_real_distribution<float> any(-reach, reach), unit(-1, 1);
+        for (int i = 0; i < kLanes; ++i) {
+            for (int c = 0; c < 3; ++c) {
+                o[c].at[i] = any(random);
+                d[c].at[i] = unit(random);
+            }
+        }
+    }
+    real3 origin() const { return real3(load(o[0].at), load(o[1].at), load(o[2].at)); }
+    real3 direction() const { return real3(load(d[0].at), load(d[1].at), load(d[2].at)); }
+};
+
+/// Roots of a t^2 + 2 b t + c = 0 in order.
+std::vector<long double> quadratic(long double a, long double b, long double c)
+{
+    const long double discriminant = b * b - a * c;
+    if (discriminant < 0)
+        return {};
+    const long double q = -(b + (b < 0 ? -1 : 1) * std::sqrt(discriminant));
+    std::vector<long double> roots{q / a, c / q};
+    std::sort(roots.begin(), roots.end());
+    return roots;
+}
+
+/// Lanes whose discriminant is within rounding of zero may go either way; the others must agree to `tolerance`.
+void compare_pair(const RootPair& found, int lane, const std::vector<long double>& expected, double tolerance,
+                  bool tangent, long double speed)
+{
+    const float t0 = values(found.t0).at[lane], t1 = values(found.t1).at[lane];
+    if (tangent)
+        return;
+    ASSERT_EQ(t0 < kHuge, !expected.empty());
+    if (expected.empty())
+        return;
+    EXPECT_LE(std::abs(t0 - expected[0]) * speed, tolerance * (1 + std::abs(expected[0]) * speed));
+    EXPECT_LE(std::abs(t1 - expected[1]) * speed, tolerance * (1 + std::abs(expected[1]) * speed));
+}
+
+TEST(formulas, roots_of_quadrics_agree_with_long_double)
+{
+    RandomRays rays;
+    const long double r = 0.8125L, k = 0.375L; // exact in single precision
+    int compared = 0;
+    for (int n = 0; n < 2000; ++n) {
+        rays.next(2);
+        const RootPair cylinder = cylinder_roots(float(r), rays.origin(), rays.direction());
+        const RootPair sphere = sphere_roots(float(r), rays.origin(), rays.direction());
+        const RootPair cone = cone_roots(float(r), float(k), rays.origin(), rays.direction());
+        for (int i = 0; i < kLanes; ++i) {
+            const long double x = rays.o[0].at[i], y = rays.o[1].at[i], z = rays.o[2].at[i];
+            const long double dx = rays.d[0].at[i], dy = rays.d[1].at[i], dz = rays.d[2].at[i];
+            const long double xy = dx * dx + dy * dy, all = xy + dz * dz;
+            const auto nearly_tangent = [](long double a, long double b, long double c) {
+                return std::abs(b * b - a * c) < 1e-3L * (b * b + std::abs(a * c)) || std::abs(a) < 0.05L;
+            };
+            const long double cyl[3] = {xy, x * dx + y * dy, x * x + y * y - r * r};
+            compare_pair(cylinder, i, quadratic(cyl[0], cyl[1], cyl[2]), 4e-6, nearly_tangent(cyl[0], cyl[1], cyl[2]),
+                         std::sqrt(all));
+            const long double sph[3] = {all, x * dx + y * dy + z * dz, x * x + y * y + z * z - r * r};
+            compare_pair(sphere, i, quadratic(sph[0], sph[1], sph[2]), 4e-6, nearly_tangent(sph[0], sph[1], sph[2]),
+                         std::sqrt(all));
+            const long double rho = r + k * z, rho_t = k * dz;
+            const long double con[3] = {xy - rho_t * rho_t, x * dx + y * dy - rho * rho_t, x * x + y * y - rho * rho};
+            compare_pair(cone, i, quadratic(con[0], con[1], con[2]), 1e-5, nearly_tangent(con[0], con[1], con[2]),
+                         std::sqrt(all));
+            ++compared;
+        }
+    }
+    EXPECT_EQ(compared, 32000);
+}
+
+/// The torus' roots by fine steps and bisection.
+std::vector<long double> torus_by_steps(long double R, long double r, const long double o[3], const long double d[3])
+{
+    const auto f = [&](long double t) {
+        const long double x = o[0] + t * d[0], y = o[1] + t * d[1], z = o[2] + t * d[2];
+        const long double rho = std::sqrt(x * x + y * y) - R;
+        return rho * rho + z * z - r * r;
+    };
+    std::vector<long double> roots;
+    constexpr int kSteps = 4000;
+    for (int i = 0; i < kSteps; ++i) {
+        long double a = -8 + 16.0L * i / kSteps, b = -8 + 16.0L * (i + 1) / kSteps;
+        if ((f(a) < 0) == (f(b) < 0))
+            continue;
+        const bool rising = f(a) < 0;
+        for (int k = 0; k < 70; ++k) {
+            const long double m = (a + b) / 2;
+            ((f(m) < 0) == rising ? a : b) = m;
+        }
+        roots.push_back(a);
+    }
+    return roots;
+}
+
+TEST(formulas, torus_roots_are_all_found_in_order)
+{
+    RandomRays rays;
+    size_t found_four = 0, missed = 0, asked = 0;
+    double worst = 0;
+    for (const float r : {0.375f, 0.0625f, 0.015625f}) {
+        for (int n = 0; n < 12; ++n) {
+            rays.next(1.2f);
+            if (n % 2 == 1) // flat rays cross a torus four times
+                for (int i = 0; i < kLanes; ++i) {
+                    rays.o[2].at[i] *= 0.3f * r;
+                    rays.d[2].at[i] *= 0.3f * r;
+                }
+            const TorusRoots roots = torus_roots(1.0f, r, rays.origin(), rays.direction());
+            const Lanes t[4] = {values(roots.t0), values(roots.t1), values(roots.t2), values(roots.t3)};
+            for (int i = 0; i < kLanes; ++i) {
+                const long double o[3] = {rays.o[0].at[i], rays.o[1].at[i], rays.o[2].at[i]};
+                long double d[3] = {rays.d[0].at[i], rays.d[1].at[i], rays.d[2].at[i]};
+                const long double speed = std::sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+                for (long double& c : d)
+                    c /= speed;
+                const std::vector<long double> expected = torus_by_steps(1, r, o, d);
+                std::vector<long double> got;
+                for (const Lanes& lane : t)
+                    if (lane.at[i] < kHuge)
+                        got.push_back(lane.at[i] * speed);
+                ++asked;
+                if (got.size() != expected.size()) {
+                    ++missed; // a chord shorter than a step, or tangent within rounding
+                    continue;
+                }
+                found_four += got.size() == 4;
+                EXPECT_TRUE(std::is_sorted(got.begin(), got.end()));
+                for (size_t k = 0; k < got.size(); ++k) {
+                    // how fast the distance changes along the ray says what rounding can do to a root
+                    const long double e = 1e-4L;
+                    const auto distance = [&](long double s) {
+                        const long double x = o[0] + s * d[0], y = o[1] + s * d[1], z = o[2] + s * d[2];
+                        return std::hypot(std::hypot(x, y) - 1, z) - r;
+                    };
+                    const long double slope = std::abs(distance(expected[k] + e) - distance(expected[k] - e)) / (2 * e);
+                    worst = std::max(worst, double(std::abs(got[k] - expected[k]) * std::min(slope, 1.0L)));
+                }
+            }
+        }
+    }
+    EXPECT_GT(found_four, 20u);
+    EXPECT_LE(missed, asked / 100);
+    EXPECT_LT(worst, 4e-6);
+}
+
+TEST(formulas, pairs_of_floats_keep_46_bits)
+{
+    std::mt19937_64 random(9);
+    std::uniform_real_distribution<double> any(-1, 1);
+    const auto pair_of = [](double x) {
+        Pair p;
+        p.hi = float(x);
+        p.lo = float(x - double(p.hi));
+        return p;
+    };
+    double worst = 0;
+    for (int i = 0; i < 20000; ++i) {
+        const Pair eye = pair_of(1e6 * any(random)), w0 = pair_of(any(random)), origin = pair_of(any(random));
+        const float tau = float(-(double(eye.hi) + eye.lo) / (double(w0.hi) + w0.lo));
+        if (!(std::abs(tau) < 1e7f))
+            continue;
+        const double exact = (double(eye.hi) + double(eye.lo)) + double(tau) * (double(w0.hi) + double(w0.lo)) -
+                             (double(origin.hi) + double(origin.lo));
+        // the result is one float
+        worst = std::max(worst, std::abs(double(anchored(eye, w0, tau, origin)) - exact) - kRounding * std::abs(exact));
+    }
+    EXPECT_LT(worst, 1e6 * std::ldexp(1.0, -44));
+}
+
+} // namespace
+} // namespace HWY_NAMESPACE
+} // namespace trimray
+HWY_AFTER_NAMESPACE();
