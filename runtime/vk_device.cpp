@@ -20,10 +20,10 @@ constexpr uint32_t kStorageBuffersNeeded = 16;
 std::atomic<uint64_t> message_count{0};
 
 // volk keeps the instance functions in globals; loading them and calling those that make or end an instance is
-// serialised here.
-std::mutex& loader_mutex()
+// serialised here. Recursive: what create() gives up ends inside it.
+std::recursive_mutex& loader_mutex()
 {
-    static std::mutex mutex;
+    static std::recursive_mutex mutex;
     return mutex;
 }
 
@@ -326,6 +326,7 @@ Result<std::unique_ptr<VulkanDevice>> VulkanDevice::create(bool allow_software, 
 
 VulkanDevice::~VulkanDevice()
 {
+    const std::scoped_lock lock(loader_mutex());
     if (device_) {
         vk_.vkDeviceWaitIdle(device_);
         vk_.vkDestroyFence(device_, fence_, nullptr);

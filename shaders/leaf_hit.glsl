@@ -26,7 +26,7 @@ struct Hit {
     vec2 uv_patch;
     uint leaf;
     uint instance;
-    bool doubt; // a leaf's Newton did not settle
+    float doubt; // where the nearest leaf begins whose Newton did not settle, as `past`; kHuge: none
 };
 
 // A point at t is origin + t * direction in patch space; t counts mm of tau.
@@ -200,7 +200,8 @@ void copy_control_points(PatchRecord patch, uint count)
 
 // Newton from the leaf's middle. A last step follows the residual that is small enough; what it ends at is accepted
 // anywhere on the patch, so that leaves leave no gaps.
-void bezier_hit(PatchRay ray, PatchRecord patch, FaceRecord face, LeafBox box, uint leaf, uint instance, inout Hit hit)
+void bezier_hit(PatchRay ray, PatchRecord patch, FaceRecord face, LeafBox box, float box_past, uint leaf, uint instance,
+                inout Hit hit)
 {
     uint degree_u = (patch.shape >> 8) & 0xffu;
     uint degree_v = (patch.shape >> 16) & 0xffu;
@@ -238,7 +239,7 @@ void bezier_hit(PatchRay ray, PatchRecord patch, FaceRecord face, LeafBox box, u
         if (settled && max(off.x, off.y) > 0.5f + kUvOverlap)
             return;
     }
-    hit.doubt = true;
+    hit.doubt = min(hit.doubt, box_past);
 }
 
 void leaf_hit(uint leaf, uint instance_index, FrameInstance instance, vec2 pixel, inout Hit hit)
@@ -258,7 +259,7 @@ void leaf_hit(uint leaf, uint instance_index, FrameInstance instance, vec2 pixel
     FaceRecord face = faces[patch.face];
     if (kind == kKindBezier) {
         if (has_kind(kKindBezier))
-            bezier_hit(ray, patch, face, box, leaf, instance_index, hit);
+            bezier_hit(ray, patch, face, box, ray.past + in_box.near, leaf, instance_index, hit);
     } else
         native_hit(ray, patch, face, kind, leaf, instance_index, hit);
 }

@@ -249,7 +249,7 @@ FramePixel hit_pixel(Hit hit, vec2 pixel, vec3 across)
     result.face = patch.face;
     result.instance = hit.instance;
     bool flagged = (leaf.quat_z_flags >> 16 & kLeafFlagged) != 0u;
-    result.status = kPixelHit | (flagged || hit.doubt ? 0u : kPixelCertified);
+    result.status = kPixelHit | (flagged || hit.doubt <= hit.past ? 0u : kPixelCertified);
     result.rgba = float[4](0.0f, 0.0f, 0.0f, 1.0f);
     if (has_feature(kFeatureShade)) {
         uint rgba = instance.color_rgba >> 24 != 0u ? instance.color_rgba : kDefaultColor;
@@ -284,9 +284,9 @@ void main()
     if (active_here) {
         vec2 pixel = vec2(float(at.x) + 0.5f - view.middle[0], float(at.y + view.first_row) + 0.5f - view.middle[1]);
         vec3 across = pixel.x * vector(view.step_x) + pixel.y * vector(view.step_y);
-        Hit hit = Hit(kHuge, 0.0f, vec2(0.0f), vec2(0.0f), 0xffffffffu, 0xffffffffu, false);
+        Hit hit = Hit(kHuge, 0.0f, vec2(0.0f), vec2(0.0f), 0xffffffffu, 0xffffffffu, kHuge);
         bool complete = walk(pixel, across, hit);
-        FramePixel result = miss_pixel(hit.doubt);
+        FramePixel result = miss_pixel(hit.doubt < kHuge);
         if (hit.past < kHuge)
             result = hit_pixel(hit, pixel, across);
         if (!complete)

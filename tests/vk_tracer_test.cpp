@@ -2,6 +2,7 @@
 // errors. The CPU tracer is what it must agree with; where both could be wrong alike, a sphere is computed by hand.
 #include "format/derive.h"
 #include "runtime/tracer.h"
+#include "runtime/vk_buffer.h"
 #include "runtime/vk_device.h"
 #include "tests/compare_frames.h"
 #include "tests/traced_scenes.h"
@@ -276,6 +277,35 @@ TEST_F(vk_tracer, takes_a_software_driver_only_with_leave)
     EXPECT_EQ(tracer.error().code, ErrorCode::NoDevice);
     EXPECT_NE(tracer.error().detail.find("software"), std::string::npos) << tracer.error().detail;
     EXPECT_NE(tracer.error().detail.find("--device cpu"), std::string::npos) << tracer.error().detail;
+}
+
+TEST_F(vk_tracer, names_the_array_that_is_too_large_for_the_device)
+{
+    const auto device = VulkanDevice::create(true, false);
+    ASSERT_TRUE(device.ok());
+    const size_t limit_bytes = (*device)->properties().limits.maxStorageBufferRange;
+    const auto buffer = VulkanBuffer::create(**device, BufferUse::Storage, limit_bytes + 1, "the leaves");
+    ASSERT_FALSE(buffer.ok());
+    EXPECT_EQ(buffer.error().code, ErrorCode::DeviceFailed);
+    EXPECT_EQ(buffer.error().where, "the leaves");
+    EXPECT_NE(buffer.error().detail.find(std::to_string(limit_bytes + 1)), std::string::npos);
+    EXPECT_NE(buffer.error().detail.find("--device cpu"), std::string::npos);
+}
+
+TEST_F(vk_tracer, lets_two_devices_live_side_by_side)
+{
+    TracedScene builder;
+    builder.add(kKindPlane, 1, {0, 0, 0}, {1, 1});
+    const auto scene = builder.finish();
+    const auto first = make(scene);
+    ASSERT_TRUE(first);
+    {
+        const auto second = make(scene);
+        ASSERT_TRUE(second);
+        EXPECT_EQ(render(*second, small_picture({8, -16, 20})).depth_mm,
+                  render(*first, small_picture({8, -16, 20})).depth_mm);
+    }
+    expect_agreement(*first, scene, small_picture({8, -16, 20}), 2000);
 }
 
 // No driver is needed for these.
