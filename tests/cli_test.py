@@ -7,13 +7,13 @@ FOLDER holds trimray and, where the converter is built, trimray-pack; without it
 import argparse
 import json
 import os
+import resource
 import shutil
 import statistics
 import struct
 import subprocess
 import sys
 import tempfile
-import time
 import unittest
 import zlib
 from pathlib import Path
@@ -185,11 +185,12 @@ class Start(CliTest):
     def test_version_takes_less_than_50_ms(self):
         if OPTIONS.sanitized:
             self.skipTest("sanitizers take their time")
-        times = []
+        times = []  # of the processor: the clock on the wall says how busy the machine is
         for _ in range(15):
-            begin = time.perf_counter()
+            before = resource.getrusage(resource.RUSAGE_CHILDREN)
             run("--version")
-            times.append(time.perf_counter() - begin)
+            after = resource.getrusage(resource.RUSAGE_CHILDREN)
+            times.append(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
         self.assertLess(statistics.median(times), 0.050)
 
 
