@@ -114,7 +114,7 @@ private:
         hit.instance = integer(~0u);
         hit.uv_face = real2(real(0.0f), real(0.0f));
         hit.normal = real3(real(0.0f), real(0.0f), real(1.0f));
-        hit.doubt = mask(false);
+        hit.doubt = real(kHuge);
         float farthest = kHuge;
         recent_count_ = 0;
         for (size_t first = 0; first < tile_count_; first += kLanes) {
@@ -251,7 +251,8 @@ private:
         const RayPlanes planes = ray_planes(origin, direction);
         // a step from this far ends within its square, times the leaf's curvature: 6e-8 is below rounding
         const scalar enough = min(max(job_.error_px * target.view.pixel, 1e-6f), 2.4e-4f);
-        const NewtonPatch newton{patch.first_control_point, degree_u, degree_v, rational, enough, box, planes};
+        const NewtonPatch newton{patch.first_control_point, degree_u, degree_v, rational, enough, box, planes,
+                                 base + per_t * in_box.near};
         const mask grazing = newton_from(target, newton, middle, moving, origin, direction, hit);
         // where a leaf may hold more roots than one: the rest of its starts, for the rays that this concerns
         mask again = (box.flags & kLeafFlagged) != 0 ? moving : grazing;
@@ -272,6 +273,7 @@ private:
         scalar enough; // residual of the last step but one, patch units
         const LeafBox& box;
         const RayPlanes& planes;
+        real box_at; // where the leaf's box begins, tau - tau_ref in mm
     };
 
     /// Newton from one start in the lanes `moving`; offers what it finds. Returns the lanes that met the surface at a
@@ -300,7 +302,7 @@ private:
         }
         grazing = grazing || moving;
         settled = settled || (moving && within_pixel); // a tangent ray
-        hit.doubt = hit.doubt || (moving && !within_pixel);
+        hit.doubt = select(moving && !within_pixel, min(newton.box_at, hit.doubt), hit.doubt);
         const mask inside = settled && abs(uv.x - 0.5f) <= 0.5f + kUvOverlap && abs(uv.y - 0.5f) <= 0.5f + kUvOverlap;
         if (!any_lane(inside))
             return grazing;

@@ -25,7 +25,7 @@ struct PacketHit {
     integer instance; // ~0: none
     real2 uv_face;
     real3 normal; // S_u x S_v in patch space, right-handed axes, any length
-    mask doubt;   // a leaf's Newton did not settle
+    real doubt;   // where the nearest leaf begins whose Newton did not settle, as `best`; kHuge: none
 };
 
 struct Packet {
@@ -168,7 +168,7 @@ HWY_INLINE void copy_to_strip(const PacketPixels& pixels, uint32_t x, uint32_t y
 {
     const mask hits = packet.alive && hit.best < kHuge;
     const uint hit_lanes = lane_bits(hits);
-    if (hit_lanes == 0 && !any_lane(packet.alive && hit.doubt)) {
+    if (hit_lanes == 0 && !any_lane(packet.alive && hit.doubt < kHuge)) {
         copy_to_strip(kMissedPixels, x, y, strip);
         return;
     }
@@ -188,7 +188,7 @@ HWY_INLINE void copy_to_strip(const PacketPixels& pixels, uint32_t x, uint32_t y
     const real3 to_eye = along * (-1.0f / speed);
     normal = select(has_normal, normal, to_eye);
     const real3 color = shade(shading.color, normal, to_eye);
-    const mask certified = shading.certified && !hit.doubt;
+    const mask certified = shading.certified && (hit.doubt >= kHuge || hit.doubt > hit.best);
 
     const real none = real(0.0f);
     const real3 shown = select(hits, job.shade ? color : real3(none, none, none), real3(none, none, none));
