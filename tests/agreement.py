@@ -59,7 +59,7 @@ def check_model(path, tools, size, timeout, pictures, trim, error_px):
             model = folder / path.name[:-4]
             subprocess.run(["zstd", "-d", "-q", str(path), "-o", str(model)], check=True)
         pack = folder / "model.tray"
-        run_json([tools["pack"], str(model), "-o", str(pack), "--json"], timeout)
+        run_json([tools["pack"], str(model), "-o", str(pack), "--json", "--no-previews"], timeout)
         info = run_json([tools["trimray"], "info", str(pack), "--json"], timeout)
         bounds = info["bounds_mm"]
         lo, hi = (bounds["lo"], bounds["hi"]) if isinstance(bounds, dict) else (bounds[0], bounds[1])
@@ -133,12 +133,13 @@ def main():
                 row = check_model(path, tools, size, options.timeout, options.pictures, options.trim, options.error_px)
             except (RuntimeError, subprocess.TimeoutExpired, json.JSONDecodeError, KeyError) as failure:
                 row = dict.fromkeys(COLUMNS, "")
-                row.update(file=str(path), verdict="failed", remark=str(failure)[:300])
+                refused = "trimray-pack: exit 3" in str(failure)  # nothing in it to trace, and said so
+                row.update(file=str(path), verdict="no shape" if refused else "failed", remark=str(failure)[:300])
             writer.writerow(row)
             table.flush()
             rows.append(row)
             print("\t".join(str(row[c]) for c in COLUMNS), flush=True)
-    bad = [row for row in rows if row["verdict"] != "ok"]
+    bad = [row for row in rows if row["verdict"] not in ("ok", "no shape")]
     print(f"{len(rows)} models, {len(rows) - len(bad)} ok, {len(bad)} not", file=sys.stderr)
     return 1 if bad else 0
 
