@@ -11,6 +11,7 @@
 #include <Message_Messenger.hxx>
 #include <STEPControl_Reader.hxx>
 #include <Standard_Failure.hxx>
+#include <TColStd_Array1OfReal.hxx>
 #include <TopExp_Explorer.hxx>
 #include <TopLoc_Location.hxx>
 #include <TopoDS.hxx>
@@ -32,7 +33,7 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 // The kernel's boxes hold the face and its tolerances; this much of the box's size more costs nothing and is safe.
-constexpr double kBoxPadding = 1e-3;
+constexpr double kBoxPadding = 1e-2;
 // What the kernel itself takes for the tolerance of a point (Precision::Confusion), in local mm.
 constexpr double kIntersectorTolerance = 1e-7;
 
@@ -118,23 +119,52 @@ TopoDS_Shape read_shape(const std::string& path, std::string& error)
     return transferred(reader);
 }
 
+/// The whole torus: the kernel's box of a torus over negative v can lack half of it.
+void add_torus(const gp_Torus& torus, Bnd_Box& box)
+{
+    const gp_XYZ center = torus.Location().XYZ(), axis = torus.Axis().Direction().XYZ();
+    gp_XYZ half;
+    for (int k = 1; k <= 3; ++k)
+        half.SetCoord(k, torus.MajorRadius() * std::sqrt(std::max(0.0, 1 - axis.Coord(k) * axis.Coord(k))) +
+                             torus.MinorRadius());
+    box.Add(gp_Pnt(center - half));
+    box.Add(gp_Pnt(center + half));
+}
+
+/// Points of splines, sweeps and offsets, at knots and between: the kernel's box cuts corners of low degree.
+void add_samples(const BRepAdaptor_Surface& surface, Bnd_Box& box)
+{
+    constexpr int kLeastSpans = 8, kMostSpans = 64; // a direction
+    const auto parameters = [&](bool along_u) {
+        const GeomAbs_Shape smooth = GeomAbs_C1;
+        const int spans = along_u ? surface.NbUIntervals(smooth) : surface.NbVIntervals(smooth);
+        TColStd_Array1OfReal breaks(1, spans + 1);
+        if (along_u)
+            surface.UIntervals(breaks, smooth);
+        else
+            surface.VIntervals(breaks, smooth);
+        const int pieces = spans >= kLeastSpans ? 1 : kLeastSpans;
+        std::vector<double> values;
+        for (int i = 1; i <= std::min(spans, kMostSpans); ++i)
+            for (int k = 0; k <= pieces; ++k)
+                values.push_back(breaks(i) + (breaks(i + 1) - breaks(i)) * k / pieces);
+        return values;
+    };
+    for (const double u : parameters(true))
+        for (const double v : parameters(false))
+            box.Add(surface.Value(u, v));
+}
+
 /// The box of a face with its tolerances, in the world; all inside out for a face without points.
 Box face_box(const TopoDS_Face& face, const gp_Trsf& to_world)
 {
     Bnd_Box kernel_box;
     BRepBndLib::Add(face, kernel_box, false);
     const BRepAdaptor_Surface surface(face);
-    if (surface.GetType() == GeomAbs_Torus) {
-        // the kernel's box of a torus over negative v can lack half of it: take the whole torus
-        const gp_Torus torus = surface.Torus();
-        const gp_XYZ center = torus.Location().XYZ(), axis = torus.Axis().Direction().XYZ();
-        gp_XYZ half;
-        for (int k = 1; k <= 3; ++k)
-            half.SetCoord(k, torus.MajorRadius() * std::sqrt(std::max(0.0, 1 - axis.Coord(k) * axis.Coord(k))) +
-                                 torus.MinorRadius());
-        kernel_box.Add(gp_Pnt(center - half));
-        kernel_box.Add(gp_Pnt(center + half));
-    }
+    if (surface.GetType() == GeomAbs_Torus)
+        add_torus(surface.Torus(), kernel_box);
+    else if (surface.GetType() > GeomAbs_Torus)
+        add_samples(surface, kernel_box);
     if (kernel_box.IsVoid())
         return {};
     kernel_box = kernel_box.Transformed(to_world);
