@@ -269,15 +269,13 @@ TrimMetric trim_metric(const CadSurface& surface, const Rect2d& domain, double r
 {
     TrimMetric metric;
     Vec2d mm = speed_at(surface, 0.5 * (domain.lo.y + domain.hi.y));
-    const double pi = 3.14159265358979323846;
-    if (surface.kind == kKindCone || surface.kind == kKindTorus || surface.kind == kKindSphere) {
+    if (surface.kind == kKindCone || surface.kind == kKindTorus || surface.kind == kKindSphere)
         mm.x = std::max(speed_at(surface, domain.lo.y).x, speed_at(surface, domain.hi.y).x);
-        // the widest circle may lie between
-        const double period = surface.kind == kKindCone ? 0 : 2 * pi;
-        if (period > 0 && std::floor(domain.hi.y / period) != std::floor(domain.lo.y / period))
-            mm.x = speed_at(surface, 0).x;
-        if (domain.lo.y <= 0 && domain.hi.y >= 0)
-            mm.x = speed_at(surface, 0).x > mm.x ? speed_at(surface, 0).x : mm.x;
+    if (surface.kind == kKindTorus || surface.kind == kKindSphere) {
+        // the widest circles of a sphere, a torus and a spindle torus' inner sheet lie at multiples of pi
+        const double pi = 3.14159265358979323846;
+        for (double k = std::ceil(domain.lo.y / pi); k * pi <= domain.hi.y && k * pi <= domain.lo.y + 2 * pi; ++k)
+            mm.x = std::max(mm.x, speed_at(surface, k * pi).x);
     }
     // a surface that collapses in a direction still needs a scale for it
     const double larger = std::max({mm.x, mm.y, 1e-300});

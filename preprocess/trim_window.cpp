@@ -274,7 +274,9 @@ void wrap(std::vector<TrimChain>& chains, const CadSurface& surface, Axis axis, 
             outer_area = area;
         }
     }
-    const double slack = std::max(kWholePeriod * period, metric.tolerance_mm / axis.scale(metric));
+    constexpr double kMostSlack = 0.01; // of the period: a collapsed direction has no scale of its own
+    const double slack =
+        std::max(kWholePeriod * period, std::min(metric.tolerance_mm / axis.scale(metric), kMostSlack * period));
     auto [window_lo, window_hi] = span(chains[outer]);
     const bool whole = window_hi - window_lo > period - slack;
     double lo = window_lo, hi = window_hi;

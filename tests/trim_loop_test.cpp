@@ -398,6 +398,23 @@ TEST(trim_loop, a_band_around_a_torus_lies_on_the_side_its_circles_say)
     EXPECT_NEAR(area_of(*other), p * (p - 1), 1e-9); // left of the upward circle at u = 1, right of u = 2
 }
 
+TEST(trim_loop, the_inner_sheet_of_a_spindle_torus_between_its_poles_is_its_domain)
+{
+    // R + r cos v = 0 at both ends: the circles there have no length, the widest one lies between
+    const double lo = 2 * M_PI / 3, hi = 4 * M_PI / 3;
+    CadFace face = plane_face({polygon_loop({{M_PI, lo}, {2 * M_PI, lo}, {2 * M_PI, hi}, {M_PI, hi}})});
+    face.surface.kind = kKindTorus;
+    face.surface.radius = 1;
+    face.surface.minor_radius = 2;
+    face.surface.period_u = face.surface.period_v = 2 * M_PI;
+    face.surface.natural_bounds = {{0, 0}, {2 * M_PI, 2 * M_PI}};
+    const Result<TrimLoops> loops = build_trim_loops(face, {});
+    ASSERT_TRUE(loops.ok()) << loops.error().detail;
+    EXPECT_TRUE(loops->natural_border);
+    EXPECT_DOUBLE_EQ(loops->domain.hi.x - loops->domain.lo.x, M_PI);
+    EXPECT_DOUBLE_EQ(loops->domain.hi.y - loops->domain.lo.y, hi - lo);
+}
+
 TEST(trim_loop, a_thread_of_many_turns_is_wrapped_into_one)
 {
     const double p = 2 * M_PI, turns = 5, pitch = 1, width = 0.4;
