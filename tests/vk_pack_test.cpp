@@ -4,10 +4,9 @@
 #include "runtime/tracer.h"
 #include "runtime/vk_device.h"
 #include "tests/compare_frames.h"
+#include "tests/keep_vulkan_loaded.h"
 
 #include <gtest/gtest.h>
-
-#include <dlfcn.h>
 
 #include <string>
 
@@ -31,8 +30,7 @@ class vk_pack : public testing::TestWithParam<const char*> {};
 
 TEST_P(vk_pack, looks_on_the_device_as_on_the_cpu)
 {
-    // the leak checker cannot name what an unloaded driver has left behind
-    dlopen("libvulkan_lvp.so", RTLD_NOW | RTLD_NODELETE);
+    keep_vulkan_loaded();
     const uint64_t messages_before = vk_validation_message_count();
     const auto scene = scene_of(GetParam());
     ASSERT_TRUE(scene);

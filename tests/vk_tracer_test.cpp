@@ -5,11 +5,10 @@
 #include "runtime/vk_buffer.h"
 #include "runtime/vk_device.h"
 #include "tests/compare_frames.h"
+#include "tests/keep_vulkan_loaded.h"
 #include "tests/traced_scenes.h"
 
 #include <gtest/gtest.h>
-
-#include <dlfcn.h>
 
 #include <algorithm>
 #include <cmath>
@@ -32,12 +31,7 @@ RenderOptions small_picture(std::array<double, 3> eye, std::array<double, 3> tar
 
 class vk_tracer : public testing::Test {
 protected:
-    static void SetUpTestSuite()
-    {
-        // the leak checker cannot name what an unloaded driver has left behind
-        dlopen("libvulkan_lvp.so", RTLD_NOW | RTLD_NODELETE);
-        dlopen("libVkLayer_khronos_validation.so", RTLD_NOW | RTLD_NODELETE);
-    }
+    static void SetUpTestSuite() { keep_vulkan_loaded(); }
     void SetUp() override
     {
         messages_before_ = vk_validation_message_count();
