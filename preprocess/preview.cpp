@@ -86,8 +86,8 @@ Status add_previews(PackImage& image, const std::string& trimray_program)
     if (folder.path().empty())
         return Error{ErrorCode::FileNotWritable, "temporary folder", "no preview: no temporary folder could be made"};
     const fs::path pack = folder.path() / "scene.tray";
-    constexpr int kFastest = 1; // the file lives for a second
-    if (const Status written = write_file_atomically(pack.string(), encode_pack(image, {kFastest})); !written.ok())
+    constexpr int kPlain = 0; // the file lives for a second: no time for compression
+    if (const Status written = write_file_atomically(pack.string(), encode_pack(image, {kPlain})); !written.ok())
         return written.error();
     const int status =
         run_quietly(trimray_program, {"preview", pack.string(), "-o", (folder.path() / "preview").string()});

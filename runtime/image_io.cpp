@@ -111,13 +111,6 @@ std::string ending(const std::string& path)
     return extension;
 }
 
-Result<std::vector<std::byte>> finished(const std::string& failure, std::vector<std::byte> bytes, const char* format)
-{
-    if (!failure.empty())
-        return Error{ErrorCode::ImageNotWritten, format, failure};
-    return bytes;
-}
-
 } // namespace
 
 float srgb_to_linear(float value)
@@ -145,16 +138,6 @@ Status write_image(const std::string& path, const Frame& frame)
     return write_file_atomically(path, *bytes);
 }
 
-Result<std::vector<std::byte>> encode_png(const Picture& picture)
-{
-    const Result<const ImageModule*>& module = image_module();
-    if (!module.ok())
-        return module.error();
-    std::vector<std::byte> bytes;
-    const std::string failure = (*module)->encode_png(picture.width, picture.height, picture.rgba.data(), bytes);
-    return finished(failure, std::move(bytes), "PNG");
-}
-
 Result<std::vector<std::byte>> encode_exr(const Frame& frame)
 {
     const Result<const ImageModule*>& module = image_module();
@@ -178,20 +161,9 @@ Result<std::vector<std::byte>> encode_exr(const Frame& frame)
     }
     std::vector<std::byte> bytes;
     const std::string failure = (*module)->encode_exr(frame.width, frame.height, channels, pixels.data(), bytes);
-    return finished(failure, std::move(bytes), "EXR");
-}
-
-Result<Picture> decode_png(std::span<const std::byte> bytes)
-{
-    const Result<const ImageModule*>& module = image_module();
-    if (!module.ok())
-        return module.error();
-    Picture picture;
-    const std::string failure =
-        (*module)->decode_png(bytes.data(), bytes.size(), picture.width, picture.height, picture.rgba);
     if (!failure.empty())
-        return Error{ErrorCode::UnsupportedFormat, "PNG", failure};
-    return picture;
+        return Error{ErrorCode::ImageNotWritten, "EXR", failure};
+    return bytes;
 }
 
 Picture to_picture(const Frame& frame)

@@ -1,5 +1,5 @@
-// Pictures in and out, through OpenImageIO in a module of its own (image_module.cpp), loaded when first used: neither
-// this library nor a program's start pays for it.
+// Pictures in and out: PNG by libpng (png_io.cpp), EXR through OpenImageIO in a module of its own (image_module.cpp),
+// loaded when first used: neither this library nor a program's start pays for it.
 #pragma once
 
 #include "format/result.h"

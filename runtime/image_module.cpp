@@ -35,16 +35,6 @@ OIIO::ImageSpec spec_of(uint32_t width, uint32_t height, int channels, OIIO::Typ
     return {static_cast<int>(width), static_cast<int>(height), channels, type};
 }
 
-std::string encode_png(uint32_t width, uint32_t height, const uint8_t* rgba, std::vector<std::byte>& bytes)
-{
-    OIIO::ImageSpec spec = spec_of(width, height, 4, OIIO::TypeDesc::UINT8);
-    spec.alpha_channel = 3;
-    spec.attribute("oiio:ColorSpace", "sRGB");
-    spec.attribute("oiio:UnassociatedAlpha", 1); // the pixels are straight already
-    spec.attribute("png:compressionLevel", 6);
-    return encode("png", spec, OIIO::TypeDesc::UINT8, rgba, bytes);
-}
-
 std::string encode_exr(uint32_t width, uint32_t height, const std::vector<std::string>& channels, const float* pixels,
                        std::vector<std::byte>& bytes)
 {
@@ -56,25 +46,6 @@ std::string encode_exr(uint32_t width, uint32_t height, const std::vector<std::s
     spec.attribute("oiio:ColorSpace", "Linear");
     spec.attribute("DateTime", ""); // without one OpenImageIO writes the time: the same frame gives the same bytes
     return encode("exr", spec, OIIO::TypeDesc::FLOAT, pixels, bytes);
-}
-
-std::string decode_png(const std::byte* bytes, size_t size, uint32_t& width, uint32_t& height,
-                       std::vector<uint8_t>& rgba)
-{
-    OIIO::Filesystem::IOMemReader memory(const_cast<std::byte*>(bytes), size);
-    const std::unique_ptr<OIIO::ImageInput> in = OIIO::ImageInput::create("png");
-    if (!in)
-        return "OpenImageIO cannot read png: " + OIIO::geterror();
-    OIIO::ImageSpec config, spec;
-    config.attribute("oiio:UnassociatedAlpha", 1);
-    if (!in->set_ioproxy(&memory) || !in->open("memory.png", spec, config))
-        return in->geterror();
-    if (spec.nchannels != 4)
-        return "expected 4 channels, found " + std::to_string(spec.nchannels);
-    width = static_cast<uint32_t>(spec.width);
-    height = static_cast<uint32_t>(spec.height);
-    rgba.resize(static_cast<size_t>(width) * height * 4);
-    return in->read_image(0, 0, 0, 4, OIIO::TypeDesc::UINT8, rgba.data()) ? "" : in->geterror();
 }
 
 // Nothing thrown leaves the module.
@@ -96,8 +67,7 @@ struct Guarded<function> {
 
 extern "C" __attribute__((visibility("default"))) const ImageModule* trimray_image_module()
 {
-    static const ImageModule module = {TRIMRAY_VERSION, Guarded<encode_png>::call, Guarded<encode_exr>::call,
-                                       Guarded<decode_png>::call};
+    static const ImageModule module = {TRIMRAY_VERSION, Guarded<encode_exr>::call};
     return &module;
 }
 

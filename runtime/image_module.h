@@ -9,14 +9,11 @@
 
 namespace trimray {
 
-/// Each returns "" or what went wrong.
+/// Functions return "" or what went wrong.
 struct ImageModule {
     const char* build; // TRIMRAY_VERSION of the module
-    std::string (*encode_png)(uint32_t width, uint32_t height, const uint8_t* rgba, std::vector<std::byte>& bytes);
     std::string (*encode_exr)(uint32_t width, uint32_t height, const std::vector<std::string>& channels,
                               const float* pixels, std::vector<std::byte>& bytes);
-    std::string (*decode_png)(const std::byte* bytes, size_t size, uint32_t& width, uint32_t& height,
-                              std::vector<uint8_t>& rgba);
 };
 
 inline constexpr const char* kImageModuleSymbol = "trimray_image_module";
