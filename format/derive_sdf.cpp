@@ -42,12 +42,13 @@ void fill_texture(PackImage& image, FaceRecord& face)
         pieces.push_back(
             load_piece(image.trim_points.data(), face.first_point, image.trim_pieces[face.first_piece + i]));
     const TrimMask mask = scan_convert(pieces, width * oversampling, height * oversampling);
-    const std::vector<float> distances = signed_distances(mask, oversampling, pixel_u, pixel_v);
+    const double shift = 0.25 * (pixel_u + pixel_v);
+    const double farthest = 129 * kSdfTexelQuantum * texel + shift; // levels end at 127 and 128 quanta
+    const std::vector<float> distances = signed_distances(mask, oversampling, pixel_u, pixel_v, farthest);
 
     // The loop runs between two pixels of different kinds, so the distance to the nearest other pixel is up to
     // `unresolved` too long and never too short; half a pixel less of it halves the error.
     const double unresolved = unresolved_distance(mask, pieces, pixel_u, pixel_v);
-    const double shift = 0.25 * (pixel_u + pixel_v);
     const double sample_error = std::max(shift, unresolved - shift) / texel;
     // |B - d| <= sqrt(hu^2 + hv^2) / 2 + q / 2 + e
     const double band = 0.5 * std::hypot(texel_u, texel_v) / texel + 0.5 * kSdfTexelQuantum + sample_error;

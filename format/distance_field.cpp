@@ -1,7 +1,9 @@
 #include "format/distance_field.h"
 
+#include <bit>
 #include <cassert>
 #include <cmath>
+#include <cstring>
 #include <limits>
 
 namespace trimray {
@@ -15,55 +17,44 @@ int first_centre(double x)
     return static_cast<int>(std::ceil(x - 0.5));
 }
 
-/// Lower envelope of the parabolas f[i] + (x - i)^2 s^2, evaluated at given rows. Kept between columns to save
-/// allocations.
-class Envelope {
-public:
-    /// Domain: f >= 0, infinite where there is no parabola.
-    void build(std::span<const double> f, double spacing)
-    {
-        spacing2_ = spacing * spacing;
-        vertex_.clear();
-        start_.clear();
-        height_.clear();
-        for (size_t q = 0; q < f.size(); ++q) {
-            if (f[q] == kInfinity)
-                continue;
-            double from = -kInfinity;
-            while (!vertex_.empty()) {
-                // where the parabolas of p and q meet: ((f_q / s^2 + q^2) - (f_p / s^2 + p^2)) / (2 q - 2 p)
-                const double p = vertex_.back(), x = static_cast<double>(q);
-                from = ((f[q] - height_.back()) / spacing2_ + x * x - p * p) / (2 * (x - p));
-                if (from > start_.back())
-                    break;
-                vertex_.pop_back();
-                start_.pop_back();
-                height_.pop_back();
-                from = -kInfinity;
-            }
-            vertex_.push_back(static_cast<double>(q));
-            start_.push_back(from);
-            height_.push_back(f[q]);
-        }
-        at_ = 0;
+/// row[x] ^= row[x - 1] from left to right, for pixels of 0 and 1: eight at a time, as the bytes of one word.
+void sum_row(uint8_t* row, uint width)
+{
+    constexpr uint kWord = sizeof(uint64_t);
+    uint8_t last = 0;
+    uint x = 0;
+    for (; std::endian::native == std::endian::little && x + kWord <= width; x += kWord) {
+        uint64_t pixels;
+        std::memcpy(&pixels, row + x, kWord);
+        pixels ^= pixels << 8;
+        pixels ^= pixels << 16;
+        pixels ^= pixels << 32;
+        pixels ^= last * uint64_t{0x0101010101010101};
+        std::memcpy(row + x, &pixels, kWord);
+        last = row[x + kWord - 1];
     }
+    for (; x < width; ++x)
+        last = row[x] ^= last;
+}
 
-    /// Squared distance at row x. Domain: x does not decrease from call to call.
-    double at(double x)
-    {
-        if (vertex_.empty())
-            return kInfinity;
-        while (at_ + 1 < vertex_.size() && start_[at_ + 1] <= x)
-            ++at_;
-        const double d = x - vertex_[at_];
-        return height_[at_] + d * d * spacing2_;
+/// Fills `changes` with each x, in order, where pixel x of the row differs from x - 1; around the row is outside.
+void find_changes(const uint8_t* row, uint width, std::vector<int>& changes)
+{
+    constexpr uint kWord = sizeof(uint64_t);
+    changes.clear();
+    uint8_t last = 0;
+    for (uint x = 0; x < width;) {
+        uint64_t pixels;
+        if (x + kWord <= width && (std::memcpy(&pixels, row + x, kWord), pixels == last * uint64_t{0x0101010101010101}))
+            x += kWord;
+        else
+            for (const uint end = std::min(x + kWord, width); x < end; last = row[x++])
+                if (row[x] != last)
+                    changes.push_back(static_cast<int>(x));
     }
-
-private:
-    std::vector<double> vertex_, start_, height_;
-    double spacing2_ = 1;
-    size_t at_ = 0;
-};
+    if (last != 0)
+        changes.push_back(static_cast<int>(width));
+}
 
 } // namespace
 
@@ -83,30 +74,24 @@ TrimMask scan_convert(std::span<const MonotonePiece> pieces, uint width, uint he
                 mask.inside[static_cast<size_t>(y) * width + x] ^= 1;
         }
     }
-    for (uint y = 0; y < height; ++y) {
-        uint8_t* row = mask.inside.data() + static_cast<size_t>(y) * width;
-        for (uint x = 1; x < width; ++x)
-            row[x] ^= row[x - 1];
-    }
+    for (uint y = 0; y < height; ++y)
+        sum_row(mask.inside.data() + static_cast<size_t>(y) * width, width);
     return mask;
 }
 
-std::vector<float> signed_distances(const TrimMask& mask, uint oversampling, double pixel_u, double pixel_v)
+std::vector<float> signed_distances(const TrimMask& mask, uint oversampling, double pixel_u, double pixel_v,
+                                    double farthest)
 {
     assert(oversampling % 2 == 1 && mask.width % oversampling == 0 && mask.height % oversampling == 0);
     const uint columns = mask.width / oversampling, rows = mask.height / oversampling;
     const uint middle = oversampling / 2;
     const size_t line = mask.height + 2; // a row of outside below and above
-    // squared distance along the row to the nearest pixel of the other kind, by column; [0]: row -1
-    std::vector<double> other(columns * line);
-    std::vector<uint8_t> inside(columns * line, 0);
+    // squared distance along the row to the nearest pixel of the other kind, negative outside, by column; [0]: row -1
+    std::vector<double> along(columns * line, -kInfinity);
     std::vector<int> changes;
     for (uint y = 0; y < mask.height; ++y) {
         const uint8_t* row = mask.inside.data() + static_cast<size_t>(y) * mask.width;
-        changes.clear(); // x where pixel x differs from x - 1, outside the mask being outside
-        for (uint x = 0; x <= mask.width; ++x)
-            if ((x > 0 ? row[x - 1] : 0) != (x < mask.width ? row[x] : 0))
-                changes.push_back(static_cast<int>(x));
+        find_changes(row, mask.width, changes);
         size_t next = 0;
         for (uint c = 0; c < columns; ++c) {
             const int x = static_cast<int>(c * oversampling + middle);
@@ -117,31 +102,30 @@ std::vector<float> signed_distances(const TrimMask& mask, uint oversampling, dou
                 steps = x - (changes[next - 1] - 1);
             if (next < changes.size())
                 steps = std::min<double>(steps, changes[next] - x);
-            other[c * line + y + 1] = steps * pixel_u * steps * pixel_u;
-            inside[c * line + y + 1] = row[x];
+            along[c * line + y + 1] = (row[x] != 0 ? 1 : -1) * (steps * pixel_u * steps * pixel_u);
         }
     }
 
     std::vector<float> out(static_cast<size_t>(columns) * rows);
-    std::vector<double> f(line);
-    Envelope envelope;
+    const double farthest2 = farthest * farthest, pixel_v2 = pixel_v * pixel_v;
     for (uint c = 0; c < columns; ++c)
-        for (const uint8_t kind : {0, 1}) {
-            const uint8_t* kinds = inside.data() + c * line;
-            bool asked = false;
-            for (uint r = 0; r < rows && !asked; ++r)
-                asked = kinds[r * oversampling + middle + 1] == kind;
-            if (!asked)
-                continue;
-            for (size_t y = 0; y < line; ++y)
-                f[y] = kinds[y] != kind ? 0 : y == 0 || y + 1 == line ? kInfinity : other[c * line + y];
-            envelope.build(f, pixel_v);
-            for (uint r = 0; r < rows; ++r) {
-                const size_t y = r * oversampling + middle + 1;
-                const double d = kinds[y] == kind ? std::sqrt(envelope.at(static_cast<double>(y))) : 0;
-                if (kinds[y] == kind)
-                    out[static_cast<size_t>(r) * columns + c] = static_cast<float>(kind != 0 ? d : -d);
+        for (uint r = 0; r < rows; ++r) {
+            const double* column = along.data() + c * line;
+            const size_t y = r * oversampling + middle + 1;
+            const double side = column[y] > 0 ? 1 : -1;
+            double nearest = std::abs(column[y]);
+            // D^2 = min over rows of along^2 + (dy pixel_v)^2, from the own row outwards until rows are too far
+            for (size_t dy = 1; dy < line; ++dy) {
+                const double across = static_cast<double>(dy * dy) * pixel_v2;
+                if (across >= nearest || across > farthest2)
+                    break;
+                // a row whose pixel is of the other kind has it at no distance along
+                if (dy <= y)
+                    nearest = std::min(nearest, std::max(0.0, side * column[y - dy]) + across);
+                if (y + dy < line)
+                    nearest = std::min(nearest, std::max(0.0, side * column[y + dy]) + across);
             }
+            out[static_cast<size_t>(r) * columns + c] = static_cast<float>(side * std::sqrt(nearest));
         }
     return out;
 }
@@ -165,6 +149,7 @@ double unresolved_distance(const TrimMask& mask, std::span<const MonotonePiece> 
                         nearest = std::min(nearest, std::hypot((x0 + dx - x) * pixel_u, (y0 + dy - y) * pixel_v));
         return nearest;
     };
+    const double diagonal = std::hypot(pixel_u, pixel_v);
     double worst = 0;
     for (const MonotonePiece& piece : pieces) {
         const double length =
@@ -174,16 +159,17 @@ double unresolved_distance(const TrimMask& mask, std::span<const MonotonePiece> 
         for (int i = 0; i <= steps; ++i) {
             const double t = static_cast<double>(i) / steps;
             const double x = bezier3(piece.u, t) * width - 0.5, y = bezier3(piece.v, t) * height - 0.5;
-            const int x0 = static_cast<int>(std::floor(x)), y0 = static_cast<int>(std::floor(y));
+            // rounded down, as x and y are above -1; std::floor is a call
+            const int x0 = static_cast<int>(x + 1) - 1, y0 = static_cast<int>(y + 1) - 1;
             const int sum = inside(x0, y0) + inside(x0 + 1, y0) + inside(x0, y0 + 1) + inside(x0 + 1, y0 + 1);
             // both kinds within the four centres around: no farther than the diagonal
-            worst = std::max(worst, sum % 4 != 0 ? std::hypot(pixel_u, pixel_v) : nearest_centre(x, y, sum == 0));
+            worst = std::max(worst, sum % 4 != 0 ? diagonal : nearest_centre(x, y, sum == 0));
             if (worst == kInfinity)
                 return worst;
         }
     }
     // a distance changes by no more than the way to the next sample
-    return worst + 0.5 * kStep * std::hypot(pixel_u, pixel_v);
+    return worst + 0.5 * kStep * diagonal;
 }
 
 uint sdf_oversampling(uint width, uint height)

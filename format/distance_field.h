@@ -6,6 +6,7 @@
 #include "format/trim_piece.h"
 
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -23,9 +24,11 @@ TrimMask scan_convert(std::span<const MonotonePiece> pieces, uint width, uint he
 
 /// Distances from the centres of every `oversampling`-th pixel (odd; the middle one of each texel) to the nearest
 /// centre of the other kind, positive inside, +-infinity if there is none. Pixels are pixel_u by pixel_v in any unit of
-/// length. Shapes: mask.width / oversampling columns, mask.height / oversampling rows.
-/// Source: Felzenszwalb & Huttenlocher, Distance Transforms of Sampled Functions, 2012 (lower envelope of parabolas).
-std::vector<float> signed_distances(const TrimMask& mask, uint oversampling, double pixel_u, double pixel_v);
+/// length. A distance beyond `farthest` may come out longer than it is, or infinite: the time a texel takes grows with
+/// it. Shapes: mask.width / oversampling columns, mask.height / oversampling rows.
+/// Source: Saito & Toriwaki, New algorithms for Euclidean distance transformation, 1994 (rows, then columns).
+std::vector<float> signed_distances(const TrimMask& mask, uint oversampling, double pixel_u, double pixel_v,
+                                    double farthest = std::numeric_limits<double>::infinity());
 
 /// How far, at most, a point of the loops lies from the nearest pixel centre of either kind: what the mask does not
 /// resolve. Infinite where a loop's inside or outside left no pixel within 64.

@@ -55,6 +55,7 @@ struct Use {
     const CadEdgeUse* edge = nullptr;
     bool backwards = false;
     Vec2d ends[2];
+    Rect2d box; // of samples
 
     Vec2d start() const { return ends[backwards ? 1 : 0]; }
     Vec2d end() const { return ends[backwards ? 0 : 1]; }
@@ -200,15 +201,16 @@ void grow(Rect2d& r, Vec2d p)
 
 constexpr Rect2d kEmptyRect{{1e300, 1e300}, {-1e300, -1e300}};
 
-/// Rectangle of samples of the walk: what the tolerance is relative to.
-void grow_by_samples(Rect2d& r, const PlacedUse& placed)
+/// Rectangle of samples of an edge: what the tolerance is relative to.
+Rect2d sampled_box(const CadEdgeUse& e, const Vec2d ends[2])
 {
     constexpr int kSamples = 32; // a quarter of an arc is seen to 1e-3 of its height
-    const CadEdgeUse& e = *placed.use.edge;
-    for (int i = 0; i <= kSamples; ++i) {
-        const Vec2d p = curve_point(e.pcurve, e.first + (e.last - e.first) * i / kSamples);
-        grow(r, {p.x + placed.shift.x, p.y + placed.shift.y});
-    }
+    Rect2d r = kEmptyRect;
+    grow(r, ends[0]);
+    grow(r, ends[1]);
+    for (int i = 1; i < kSamples && !is_straight(e.pcurve); ++i)
+        grow(r, curve_point(e.pcurve, e.first + (e.last - e.first) * i / kSamples));
+    return r;
 }
 
 bool usable(const CadEdgeUse& use, std::string& failure)
@@ -298,10 +300,14 @@ std::vector<TrimChain> build_chains(const CadFace& face, double relative_toleran
                 return {};
             if (!(edge.first < edge.last))
                 continue; // an edge without length
-            const Use use{
-                &edge, edge.reversed, {curve_point(edge.pcurve, edge.first), curve_point(edge.pcurve, edge.last)}};
+            Use use{&edge,
+                    edge.reversed,
+                    {curve_point(edge.pcurve, edge.first), curve_point(edge.pcurve, edge.last)},
+                    kEmptyRect};
+            use.box = sampled_box(edge, use.ends);
+            grow(rough, use.box.lo);
+            grow(rough, use.box.hi);
             loops.back().push_back(use);
-            grow_by_samples(rough, {use, {0, 0}});
         }
     }
     const TrimMetric rough_metric = trim_metric(face.surface, rough, relative_tolerance);
@@ -318,8 +324,10 @@ std::vector<TrimChain> build_chains(const CadFace& face, double relative_toleran
     double largest_size = -1;
     for (const Walk& walk : walks) {
         Rect2d r = kEmptyRect;
-        for (const PlacedUse& placed : walk)
-            grow_by_samples(r, placed);
+        for (const auto& [use, shift] : walk) {
+            grow(r, {use.box.lo.x + shift.x, use.box.lo.y + shift.y});
+            grow(r, {use.box.hi.x + shift.x, use.box.hi.y + shift.y});
+        }
         const double size =
             std::max((r.hi.x - r.lo.x) * rough_metric.mm_per_uv.x, (r.hi.y - r.lo.y) * rough_metric.mm_per_uv.y);
         if (size > largest_size) {

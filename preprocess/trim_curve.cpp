@@ -33,7 +33,7 @@ double dot(Vec2d a, Vec2d b)
 }
 double length(Vec2d a)
 {
-    return std::hypot(a.x, a.y);
+    return std::sqrt(dot(a, a)); // in mm of a model: no overflow to guard against
 }
 
 struct PointAndSlope {
@@ -219,6 +219,18 @@ Vec2d cubic_at(const Vec2d p[4], double t)
     return (s * s * s) * p[0] + (3 * s * s * t) * p[1] + (3 * s * t * t) * p[2] + (t * t * t) * p[3];
 }
 
+/// A cubic in powers of t, for evaluating at many parameters: C(t) = ((a t + b) t + c) t + p0.
+struct PowerCubic {
+    Vec2d a, b, c, p0;
+
+    explicit PowerCubic(const Vec2d p[4])
+        : a(p[3] - p[0] + 3.0 * (p[1] - p[2])), b(3.0 * (p[0] - 2.0 * p[1] + p[2])), c(3.0 * (p[1] - p[0])), p0(p[0])
+    {
+    }
+    Vec2d at(double t) const { return t * (t * (t * a + b) + c) + p0; }
+    Vec2d slope(double t) const { return t * ((3 * t) * a + 2.0 * b) + c; }
+};
+
 /// Solves the symmetric 4x4 system a x = b in place by elimination; a is positive definite.
 void solve4(double a[4][4], double b[4])
 {
@@ -349,8 +361,9 @@ private:
         candidate_ = {{a.p, a.p + h * a.d_after, b.p - h * b.d_before, b.p}, true};
         order_points(candidate_);
         candidate_deviation_ = 0;
+        const PowerCubic fitted(candidate_.p);
         visit_points(i, i + 1, 8, [&](Vec2d q, double s) {
-            candidate_deviation_ = std::max(candidate_deviation_, distance(candidate_.p, q, s));
+            candidate_deviation_ = std::max(candidate_deviation_, distance(fitted, q, s));
             return true;
         });
     }
@@ -378,13 +391,11 @@ private:
     }
 
     /// Distance of q from the cubic; t: where to start, and where the foot was found.
-    static double distance(const Vec2d p[4], Vec2d q, double& t)
+    static double distance(const PowerCubic& cubic, Vec2d q, double& t)
     {
         // f(t) = (C - q) . C'; the second derivative is left out of the slope while far, so the step never runs away
         for (int i = 0; i < 4; ++i) {
-            const double s = 1 - t;
-            const Vec2d e = cubic_at(p, t) - q;
-            const Vec2d d = 3 * ((s * s) * (p[1] - p[0]) + (2 * s * t) * (p[2] - p[1]) + (t * t) * (p[3] - p[2]));
+            const Vec2d e = cubic.at(t) - q, d = cubic.slope(t);
             const double slope = dot(d, d);
             if (!(slope > 0))
                 break;
@@ -394,7 +405,12 @@ private:
             if (step < 1e-6)
                 break;
         }
-        return length(cubic_at(p, t) - q);
+        return length(cubic.at(t) - q);
+    }
+
+    static bool same_points(const Vec2d a[4], const Vec2d b[4])
+    {
+        return std::equal(a, a + 4, b, [](Vec2d x, Vec2d y) { return x.x == y.x && x.y == y.y; });
     }
 
     bool cubic(size_t first, size_t last)
@@ -419,10 +435,15 @@ private:
             std::copy(p, p + 4, candidate_.p);
             order_points(candidate_);
             candidate_deviation_ = 0;
+            const bool in_order = same_points(candidate_.p, p);
+            const PowerCubic ordered(candidate_.p), free(p);
             for (size_t k = 0; k < count; ++k) {
                 double foot = t[k];
-                candidate_deviation_ = std::max(candidate_deviation_, distance(candidate_.p, q[k], foot));
-                distance(p, q[k], t[k]);
+                candidate_deviation_ = std::max(candidate_deviation_, distance(ordered, q[k], foot));
+                if (in_order)
+                    t[k] = foot;
+                else
+                    distance(free, q[k], t[k]);
             }
             if (candidate_deviation_ <= tolerance_)
                 return verify(first, last);
@@ -438,10 +459,11 @@ private:
     bool verify(size_t first, size_t last)
     {
         double t = 0;
+        const PowerCubic fitted(candidate_.p);
         visit_points(first, last, std::max<size_t>(last - first, 40), [&](Vec2d q, double share) {
             // the foot moves on with the samples; the share of the way guards against a stuck one
             double foot = std::abs(t - share) < 0.1 ? t : share;
-            candidate_deviation_ = std::max(candidate_deviation_, distance(candidate_.p, q, foot));
+            candidate_deviation_ = std::max(candidate_deviation_, distance(fitted, q, foot));
             t = foot;
             return candidate_deviation_ <= tolerance_;
         });
@@ -539,6 +561,11 @@ void split_piece(const CurvePiece& piece, double t, CurvePiece& before, CurvePie
     after = {{middle, bc, c, piece.p[3]}, piece.cubic};
 }
 
+bool is_straight(const SplineCurve2d& curve)
+{
+    return curve.degree == 1 && curve.control_points.size() == 2;
+}
+
 Vec2d curve_point(const SplineCurve2d& curve, double t)
 {
     return evaluate_span(curve, find_span(curve, t), t).p;
@@ -548,6 +575,13 @@ CurveFit fit_curve(const SplineCurve2d& curve, double first, double last, Vec2d 
 {
     assert(first < last && curve.degree >= 1 && curve.degree <= static_cast<int>(kMaxDegree));
     CurveFit fit;
+    if (is_straight(curve)) { // most pcurves
+        const Vec2d a = curve_point(curve, first), b = curve_point(curve, last);
+        fit.finite = std::isfinite(a.x) && std::isfinite(a.y) && std::isfinite(b.x) && std::isfinite(b.y);
+        if (fit.finite)
+            fit.pieces.push_back({{a, a + (1 / 3.0) * (b - a), a + (2 / 3.0) * (b - a), b}, false});
+        return fit;
+    }
     const std::vector<Node> nodes = Sampler(curve, metric, kSamplingShare * tolerance).run(first, last);
     if (!is_finite(nodes)) {
         fit.finite = false;

@@ -24,6 +24,9 @@ void split_piece(const CurvePiece& piece, double t, CurvePiece& before, CurvePie
 /// Point of a B-spline curve at t. Domain: knots[degree] <= t <= knots[n]; outside, the end spans go on.
 Vec2d curve_point(const SplineCurve2d& curve, double t);
 
+/// Whether the curve is one line between two points.
+bool is_straight(const SplineCurve2d& curve);
+
 struct CurveFit {
     std::vector<CurvePiece> pieces; // in the order of t, consecutive ends equal
     double deviation = 0;           // largest distance of the curve's samples from their piece, in the metric
