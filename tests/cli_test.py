@@ -207,7 +207,7 @@ class Info(CliTest):
         self.assertLessEqual(sum(info["bytes_by_section"].values()), PACK.stat().st_size)
         low, high = info["bounds_mm"]
         for axis in range(3):
-            self.assertLess(lo[axis], hi[axis])
+            self.assertLess(low[axis], high[axis])
         for item in info["effects"]:
             self.assertEqual(set(item), {"name", "why"})
             self.assertTrue(item["name"] and item["why"])
