@@ -43,6 +43,11 @@ constexpr double kInfiniteSide = 1e100; // the kernel writes 2e100
 // A cone this flat or flatter goes on as a spline: its two nappes lie so close that a quadratic in single precision
 // cannot tell their roots apart. 1e-2 already costs a digit in depth; files hold cones of 7e-7.
 constexpr double kFlatConeCosine = 0.02;
+bool is_flat_cone(double half_angle)
+{
+    return std::abs(std::cos(half_angle)) < kFlatConeCosine;
+}
+
 constexpr double kTwoPi = 2 * std::numbers::pi;
 
 Vec3d vec(const gp_XYZ& p)
@@ -444,7 +449,9 @@ bool conversion_needs_bounds(const TopoDS_Face& face, const ImportOptions& optio
         return false;
     const bool spline = surface->IsKind(STANDARD_TYPE(Geom_BoundedSurface));
     const bool elementary = surface->IsKind(STANDARD_TYPE(Geom_ElementarySurface));
-    return !spline && !(elementary && options.native_surfaces);
+    const auto cone = Handle(Geom_ConicalSurface)::DownCast(surface);
+    const bool flat_cone = !cone.IsNull() && is_flat_cone(cone->SemiAngle());
+    return !spline && !(elementary && options.native_surfaces && !flat_cone);
 }
 
 Result<ConvertedSurface> convert_surface(const TopoDS_Face& face, const Rect2d& bounds, const ImportOptions& options,
@@ -469,8 +476,7 @@ Result<ConvertedSurface> convert_surface(const TopoDS_Face& face, const Rect2d& 
         return result;
     result->uv_map.u.scale *= scale_u;
     result->uv_map.v.scale *= scale_v;
-    const bool flat_cone =
-        result->surface.kind == kKindCone && std::abs(std::cos(result->surface.half_angle)) < kFlatConeCosine;
+    const bool flat_cone = result->surface.kind == kKindCone && is_flat_cone(result->surface.half_angle);
     if ((!options.native_surfaces && result->surface.kind != kKindBezier) || flat_cone)
         result = native_as_spline(*result, mapped_bounds(bounds, result->uv_map));
     const SplineSurface& s = result->surface.spline;

@@ -59,7 +59,7 @@ def check_model(path, tools, size, timeout, pictures, trim, error_px):
             model = folder / path.name[:-4]
             subprocess.run(["zstd", "-d", "-q", str(path), "-o", str(model)], check=True)
         pack = folder / "model.tray"
-        run_json([tools["pack"], str(model), "-o", str(pack), "--json", "--no-previews"], timeout)
+        packed = run_json([tools["pack"], str(model), "-o", str(pack), "--json", "--no-previews"], timeout)
         info = run_json([tools["trimray"], "info", str(pack), "--json"], timeout)
         bounds = info["bounds_mm"]
         lo, hi = (bounds["lo"], bounds["hi"]) if isinstance(bounds, dict) else (bounds[0], bounds[1])
@@ -92,6 +92,9 @@ def check_model(path, tools, size, timeout, pictures, trim, error_px):
     faults = []
     if total["agree"] < SHARE * (total["rays"] - total["oracle"]):  # where the kernel is not proved wrong
         faults.append("share")
+    if packed["dropped"]:
+        faults.append("faces dropped")
+        row["remark"] = f"{len(packed['dropped'])} dropped: {packed['dropped'][0]['reason']}; {row['remark']}"
     if total["unexplained"]:
         faults.append("unexplained")
     row["verdict"] = ", ".join(faults) or "ok"

@@ -4,6 +4,7 @@
 #include <BRepBndLib.hxx>
 #include <BRepBuilderAPI_MakeFace.hxx>
 #include <BRepBuilderAPI_Transform.hxx>
+#include <BRepPrimAPI_MakeCone.hxx>
 #include <BRepPrimAPI_MakeCylinder.hxx>
 #include <BRepTools.hxx>
 #include <BRep_Builder.hxx>
@@ -100,6 +101,15 @@ bool write_swept_model(const std::string& path)
         builder.Add(all, with_hole(offset, gp_Ax2(gp_Pnt(17, 57, -50), gp_Dir(0, 0, 1)), 4));
         builder.Add(all, BRepBuilderAPI_MakeFace(Handle(Geom_Surface)(sheet), kFaceTolerance).Shape());
         return write_shape(all, path);
+    } catch (const Standard_Failure&) {
+        return false;
+    }
+}
+
+bool write_flat_cone(const std::string& path)
+{
+    try {
+        return write_shape(BRepPrimAPI_MakeCone(10, 4, 1e-5).Shape(), path);
     } catch (const Standard_Failure&) {
         return false;
     }

@@ -10,6 +10,9 @@ namespace trimray::oracle {
 /// written.
 bool write_swept_model(const std::string& path);
 
+/// A frustum so flat that its two nappes lie within single precision of each other. False: not written.
+bool write_flat_cone(const std::string& path);
+
 /// The faces of a file, copied as their mirror image in the plane x = 0: quadrics get left-handed axis systems.
 bool write_left_handed_copy(const std::string& from, const std::string& path);
 

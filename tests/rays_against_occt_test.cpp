@@ -164,6 +164,13 @@ TEST(RaysAgainstOcctMade, AgreeOnSweptAndOffsetSurfaces)
     expect_agreement(file.path);
 }
 
+TEST(RaysAgainstOcctMade, AgreeOnAConeThatIsNearlyFlat)
+{
+    const TemporaryFile file("flat_cone.brep");
+    ASSERT_TRUE(oracle::write_flat_cone(file.path));
+    expect_agreement(file.path);
+}
+
 TEST(RaysAgainstOcctMade, AgreeOnLeftHandedAxisSystems)
 {
     const TemporaryFile file("left_handed.brep");
