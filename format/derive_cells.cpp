@@ -2,6 +2,7 @@
 // (pack_layout.h, CellEntry). The reference line of a column lies a little beyond the cells' right edge at a u that no
 // single-precision number has, so no end of a piece and no vertical piece lies on it; rows likewise. Every decision
 // about a crossing of that line uses the same rounded eta that the query will see, so parity cannot break.
+#include "format/alike_trims.h"
 #include "format/derive.h"
 #include "format/trim_piece.h"
 
@@ -190,10 +191,11 @@ FaceCells choose_cells(std::span<const MonotonePiece> pieces, std::span<const ui
 
 void derive_cells(PackImage& image)
 {
+    const std::vector<uint> alike = first_alike(image);
     std::vector<FaceCells> built(image.faces.size());
     tbb::parallel_for(size_t{0}, image.faces.size(), [&](size_t f) {
         const FaceRecord& face = image.faces[f];
-        if (face.piece_count == 0)
+        if (face.piece_count == 0 || alike[f] != f)
             return;
         const std::span<const uint> words(image.trim_pieces.data() + face.first_piece, face.piece_count);
         std::vector<MonotonePiece> pieces;
@@ -209,12 +211,13 @@ void derive_cells(PackImage& image)
     image.cell_entries.clear();
     for (size_t f = 0; f < built.size(); ++f) {
         FaceRecord& face = image.faces[f];
-        face.grid = built[f].columns | built[f].rows << 16;
+        const FaceCells& own = built[alike[f]];
+        face.grid = own.columns | own.rows << 16;
         face.first_cell = static_cast<uint>(image.cells.size());
         face.first_entry = static_cast<uint>(image.cell_entries.size());
-        face.entry_count = static_cast<uint>(built[f].entries.size());
-        image.cells.insert(image.cells.end(), built[f].cells.begin(), built[f].cells.end());
-        image.cell_entries.insert(image.cell_entries.end(), built[f].entries.begin(), built[f].entries.end());
+        face.entry_count = static_cast<uint>(own.entries.size());
+        image.cells.insert(image.cells.end(), own.cells.begin(), own.cells.end());
+        image.cell_entries.insert(image.cell_entries.end(), own.entries.begin(), own.entries.end());
     }
 }
 

@@ -1,4 +1,5 @@
 // Distance textures: their sizes from the memory allowed (paper, eq. 4 and 5) and their texels.
+#include "format/alike_trims.h"
 #include "format/derive.h"
 #include "format/distance_field.h"
 
@@ -96,10 +97,21 @@ void derive_sdf(PackImage& image)
         word_count += words_of(face.sdf_size);
     }
     image.sdf_words.assign(word_count, 0);
+    const std::vector<uint> alike = first_alike(image);
     tbb::parallel_for(size_t{0}, image.faces.size(), [&](size_t f) {
-        if (image.faces[f].sdf_size != 0)
+        if (has_texture(image.faces[f]) && alike[f] == f)
             fill_texture(image, image.faces[f]);
     });
+    for (size_t f = 0; f < image.faces.size(); ++f) {
+        FaceRecord& face = image.faces[f];
+        const FaceRecord& filled = image.faces[alike[f]];
+        if (alike[f] == f || !has_texture(face))
+            continue;
+        face.sdf_texel_mm = filled.sdf_texel_mm;
+        face.sdf_band_texels = filled.sdf_band_texels;
+        std::copy_n(image.sdf_words.begin() + filled.sdf_first_word, words_of(face.sdf_size),
+                    image.sdf_words.begin() + face.sdf_first_word);
+    }
 }
 
 void allocate_trim_memory(PackImage& image, double total_bytes, TrimLayout layout)
