@@ -136,6 +136,12 @@ double unresolved_distance(const TrimMask& mask, std::span<const MonotonePiece> 
     const auto inside = [&](int x, int y) {
         return x >= 0 && y >= 0 && x < width && y < height && mask.inside[static_cast<size_t>(y) * mask.width + x] != 0;
     };
+    const auto sum_of_four = [&](int x, int y) {
+        if (x < 0 || y < 0 || x + 1 >= width || y + 1 >= height)
+            return inside(x, y) + inside(x + 1, y) + inside(x, y + 1) + inside(x + 1, y + 1);
+        const uint8_t* row = &mask.inside[static_cast<size_t>(y) * mask.width + x];
+        return row[0] + row[1] + row[width] + row[width + 1];
+    };
     constexpr double kStep = 0.5; // pixels between samples of a loop
     constexpr int kReach = 64;    // pixels: farther than any band is wide
     // distance from (x, y), in pixels, to the nearest centre of a kind: square rings around, until no ring is nearer
@@ -158,10 +164,13 @@ double unresolved_distance(const TrimMask& mask, std::span<const MonotonePiece> 
         const int steps = 1 + static_cast<int>(length * (piece.cubic ? 3 : 1) / kStep);
         for (int i = 0; i <= steps; ++i) {
             const double t = static_cast<double>(i) / steps;
-            const double x = bezier3(piece.u, t) * width - 0.5, y = bezier3(piece.v, t) * height - 0.5;
+            const double x =
+                (piece.cubic ? bezier3(piece.u, t) : piece.u[0] + t * (piece.u[3] - piece.u[0])) * width - 0.5;
+            const double y =
+                (piece.cubic ? bezier3(piece.v, t) : piece.v[0] + t * (piece.v[3] - piece.v[0])) * height - 0.5;
             // rounded down, as x and y are above -1; std::floor is a call
             const int x0 = static_cast<int>(x + 1) - 1, y0 = static_cast<int>(y + 1) - 1;
-            const int sum = inside(x0, y0) + inside(x0 + 1, y0) + inside(x0, y0 + 1) + inside(x0 + 1, y0 + 1);
+            const int sum = sum_of_four(x0, y0);
             // both kinds within the four centres around: no farther than the diagonal
             worst = std::max(worst, sum % 4 != 0 ? diagonal : nearest_centre(x, y, sum == 0));
             if (worst == kInfinity)

@@ -448,7 +448,7 @@ private:
             if (candidate_deviation_ <= tolerance_)
                 return verify(first, last);
             // with one parameter a point fitted, error shrinks by orders a round or not at all
-            if (round >= 2 && candidate_deviation_ > 30 * tolerance_)
+            if (round >= 1 && candidate_deviation_ > (round == 1 ? 1000 : 30) * tolerance_)
                 return false;
             fit_by_normals(q.data(), t.data(), count, p);
         }
