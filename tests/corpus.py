@@ -29,6 +29,12 @@ COLUMNS = (["file", "verdict", "exit", "faces", "expected", "converted", "droppe
 CAD_ENDINGS = {".step", ".stp", ".igs", ".iges", ".brep"}
 # A file without a shape is invalid input, or one that made the kernel crash.
 REFUSALS = {3, 4, 5}
+# What is right although it is not "ok": the verdict that is expected, and why.
+KNOWN = {
+    "hard/ap203_invalid_brep.stp": ("not packed", "its only loop is one circle around an endless cylinder: no area"),
+    "hard/Legacy_Klicky_Probe.step.zst":
+        ("faces dropped", "one face that the kernel itself splits off at a pole, outside of its own surface"),
+}
 SLACK_SECONDS = 20  # the converter's own limit comes first, and gives the clearer message
 
 
@@ -158,6 +164,9 @@ def check_file(corpus, name, expected, tools, timeout, pack_dir):
             if pack.exists():
                 faults.append("left a pack")
         row["verdict"] = ", ".join(faults) or "ok"
+        verdict, reason = KNOWN.get(str(name), ("", ""))
+        if row["verdict"] == verdict:
+            row.update(verdict="ok", remark=reason)
     return row
 
 
