@@ -74,7 +74,8 @@ FN_LARGE real cubic_root_between(real c3, real c2, real c1, real c0, real lo, re
         b = select(moving && !left, t, b);
         PRECISE real next = t - f.value / select(abs(f.slope) > 1e-30f, f.slope, real(1e-30f));
         next = select(next >= a && next <= b, next, 0.5f * (a + b));
-        // a lane that has settled stays: at the root the sign is noise, and would send it off to the middle of its bracket
+        // a lane that has settled stays: at the root the sign is noise, and would send it off to the middle of its
+        // bracket
         mask still = moving && abs(next - t) > 1e-6f;
         t = select(moving, next, t);
         moving = still;
