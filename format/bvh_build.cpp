@@ -15,6 +15,7 @@ constexpr uint kWidth = 4;
 struct BuildNode {
     uint child_count = 0; // 0: a leaf
     uint box = 0;         // of a leaf
+    Box3f bounds{};       // of all boxes below
     BuildNode* child[kWidth] = {};
 };
 
@@ -105,17 +106,32 @@ Box3f joined(const Box3f& a, const Box3f& b)
     return out;
 }
 
-/// Fills origin, exponents, lo and hi of a node so that each child's decoded box holds the child's box.
-void quantise(const std::array<Box3f, kWidth>& children, uint count, BvhNode& node)
+/// Gathers the boxes from the leaves up.
+void join_boxes(const std::vector<Box3f>& boxes, BuildNode& node)
 {
+    if (node.child_count == 0) {
+        node.bounds = boxes[node.box];
+        return;
+    }
+    for (uint i = 0; i < node.child_count; ++i) {
+        join_boxes(boxes, *node.child[i]);
+        node.bounds = i == 0 ? node.child[0]->bounds : joined(node.bounds, node.child[i]->bounds);
+    }
+}
+
+/// Fills exponents, lo and hi of a node, whose origin is at or below all children, so that each child's decoded box
+/// holds the child's box.
+void quantise(const BuildNode& from, BvhNode& node)
+{
+    const uint count = from.child_count;
+    std::array<Box3f, kWidth> children;
+    for (uint i = 0; i < count; ++i)
+        children[i] = from.child[i]->bounds;
     constexpr int kLeastExponent = -60, kBias = 127; // thinner than 1e-18 of a part is flat
-    Box3f all = children[0];
-    for (uint i = 1; i < count; ++i)
-        all = joined(all, children[i]);
+    const Box3f& all = from.bounds;
     node.exponents = count << 24;
     for (int c = 0; c < 3; ++c) {
-        const float origin = all.lo[c];
-        node.origin[c] = origin;
+        const float origin = node.origin[c];
         int exponent = kLeastExponent;
         const double extent = double(all.hi[c]) - origin;
         if (extent > 0)
@@ -144,33 +160,32 @@ void quantise(const std::array<Box3f, kWidth>& children, uint count, BvhNode& no
     }
 }
 
-/// Writes the nodes below `from` in preorder and returns its box.
-Box3f write_nodes(const std::vector<Box3f>& boxes, const BuildNode& from, Bvh& bvh, uint depth)
+/// Writes the nodes below `from` in preorder. A node's origin is its box's corner as the parent's quantised box has it:
+/// it holds no news, so it costs nothing in a file (SPEC.md, filter 2).
+void write_nodes(const BuildNode& from, const std::array<float, 3>& origin, Bvh& bvh, uint depth)
 {
     assert(depth <= kMaxBvhDepth && "the builders keep the depth");
     const size_t index = bvh.nodes.size();
-    bvh.nodes.emplace_back();
     BvhNode node{};
-    std::array<Box3f, kWidth> children;
-    for (uint i = 0; i < from.child_count; ++i) {
-        const BuildNode& child = *from.child[i];
-        if (child.child_count == 0) {
-            node.child[i] = kBvhLeaf | child.box;
-            bvh.order.push_back(child.box);
-            children[i] = boxes[child.box];
-        } else {
-            node.child[i] = static_cast<uint>(bvh.nodes.size());
-            children[i] = write_nodes(boxes, child, bvh, depth + 1);
+    std::copy(origin.begin(), origin.end(), node.origin);
+    quantise(from, node);
+    bvh.nodes.push_back(node);
+    for (uint i = 0; i < kWidth; ++i) {
+        uint word = kBvhEmpty;
+        if (i < from.child_count && from.child[i]->child_count == 0) {
+            word = kBvhLeaf | from.child[i]->box;
+            bvh.order.push_back(from.child[i]->box);
+        } else if (i < from.child_count) {
+            word = static_cast<uint>(bvh.nodes.size());
+            std::array<float, 3> corner;
+            for (int c = 0; c < 3; ++c) {
+                const float step = std::ldexp(1.0f, int(node.exponents >> 8 * c & 0xffu) - 127);
+                corner[c] = node.origin[c] + step * float(node.lo[c] >> 8 * i & 0xffu);
+            }
+            write_nodes(*from.child[i], corner, bvh, depth + 1);
         }
+        bvh.nodes[index].child[i] = word;
     }
-    for (uint i = from.child_count; i < kWidth; ++i)
-        node.child[i] = kBvhEmpty;
-    quantise(children, from.child_count, node);
-    bvh.nodes[index] = node;
-    Box3f all = children[0];
-    for (uint i = 1; i < from.child_count; ++i)
-        all = joined(all, children[i]);
-    return all;
 }
 
 } // namespace
@@ -181,7 +196,7 @@ Bvh build_bvh(RTCDevice device, const std::vector<Box3f>& boxes)
     if (boxes.empty())
         return out;
     out.order.reserve(boxes.size());
-    const BuildNode* root = nullptr;
+    BuildNode* root = nullptr;
     RTCBVH bvh = nullptr;
     if (boxes.size() > kWidth) {
         bvh = rtcNewBVH(device);
@@ -197,10 +212,11 @@ Bvh build_bvh(RTCDevice device, const std::vector<Box3f>& boxes)
     BuildNode single; // one box still gets one node
     if (root->child_count == 0) {
         single.child_count = 1;
-        single.child[0] = const_cast<BuildNode*>(root);
+        single.child[0] = root;
         root = &single;
     }
-    write_nodes(boxes, *root, out, 1);
+    join_boxes(boxes, *root);
+    write_nodes(*root, root->bounds.lo, out, 1);
     if (bvh)
         rtcReleaseBVH(bvh);
     return out;

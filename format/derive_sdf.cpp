@@ -23,6 +23,15 @@ bool has_texture(const FaceRecord& face)
     return face.piece_count != 0 && (face.sdf_size & 0xffffu) != 0 && (face.sdf_size >> 16) != 0;
 }
 
+/// The least number of 12 bits that is not below x > 0: a texture's unit and band are free within that, and so short
+/// they compress.
+double rounded_up(double x)
+{
+    int exponent = 0;
+    const double mantissa = std::frexp(x, &exponent);
+    return std::ldexp(std::ceil(std::ldexp(mantissa, 12)), exponent - 12);
+}
+
 uint words_of(uint sdf_size)
 {
     return ((sdf_size & 0xffffu) + 3) / 4 * (sdf_size >> 16);
@@ -35,7 +44,7 @@ void fill_texture(PackImage& image, FaceRecord& face)
     const bool measured = face.extent_mm[0] > 0 && face.extent_mm[1] > 0;
     const double texel_u = (measured ? static_cast<double>(face.extent_mm[0]) : 1.0) / width;
     const double texel_v = (measured ? static_cast<double>(face.extent_mm[1]) : 1.0) / height;
-    const double texel = std::max(texel_u, texel_v);
+    const double texel = rounded_up(std::max(texel_u, texel_v));
     const double pixel_u = texel_u / oversampling, pixel_v = texel_v / oversampling;
 
     std::vector<MonotonePiece> pieces;
@@ -54,7 +63,7 @@ void fill_texture(PackImage& image, FaceRecord& face)
     // |B - d| <= sqrt(hu^2 + hv^2) / 2 + q / 2 + e
     const double band = 0.5 * std::hypot(texel_u, texel_v) / texel + 0.5 * kSdfTexelQuantum + sample_error;
     face.sdf_texel_mm = static_cast<float>(texel);
-    face.sdf_band_texels = band < kNeverDecides ? static_cast<float>(band * (1 + 1e-6)) : kNeverDecides;
+    face.sdf_band_texels = band < kNeverDecides ? static_cast<float>(rounded_up(band * (1 + 1e-6))) : kNeverDecides;
 
     const uint row_words = (width + 3) / 4;
     uint* words = image.sdf_words.data() + face.sdf_first_word;

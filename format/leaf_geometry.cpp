@@ -9,6 +9,9 @@ namespace trimray {
 namespace {
 
 constexpr double kQuatUnit = 32767;
+// Axes are turned by up to 5e-4 rad to lose 5 bits of noise; a leaf's surface turns by 0.2 rad, so its box barely
+// grows.
+constexpr int kQuatStep = 32;
 constexpr double kPi = 3.14159265358979323846;
 
 double signed_low(uint bits)
@@ -28,6 +31,13 @@ int to_int(double x, int lo, int hi)
 uint low_bits(int x)
 {
     return static_cast<uint>(x) & 0xffffu;
+}
+
+/// n rounded up to 7 significant bits: at most 1/64 more. 0 <= n <= 65535, and so is the result.
+int seven_bits_up(int n)
+{
+    const int step = n < 128 ? 1 : 1 << (std::ilogb(double(n)) - 6);
+    return std::min((n + step - 1) / step * step, 65535);
 }
 
 std::array<Point3, 3> axes_of(double x, double y, double z)
@@ -99,9 +109,11 @@ std::array<Point3, 3> encode_leaf_axes(const std::array<Point3, 3>& axes, LeafRe
     const std::array<Point3, 3> r = nearest_to_identity(axes);
     // w = sqrt(1 + trace) / 2,  (x, y, z) = (R_zy - R_yz, R_xz - R_zx, R_yx - R_xy) / 4w; r[i] are columns
     const double w = 0.5 * std::sqrt(1 + r[0][0] + r[1][1] + r[2][2]);
-    const int x = to_int((r[1][2] - r[2][1]) / (4 * w) * kQuatUnit, -32767, 32767);
-    const int y = to_int((r[2][0] - r[0][2]) / (4 * w) * kQuatUnit, -32767, 32767);
-    const int z = to_int((r[0][1] - r[1][0]) / (4 * w) * kQuatUnit, -32767, 32767);
+    const auto rounded = [w](double four_w_q) {
+        const double unit = kQuatUnit / kQuatStep; // times 32 stays within 32767: to_int rounds towards it at the ends
+        return kQuatStep * to_int(four_w_q / (4 * w) * unit, -1023, 1023);
+    };
+    const int x = rounded(r[1][2] - r[2][1]), y = rounded(r[2][0] - r[0][2]), z = rounded(r[0][1] - r[1][0]);
     leaf.quat_xy = low_bits(x) | low_bits(y) << 16;
     leaf.quat_z_flags = (leaf.quat_z_flags & 0xffff0000u) | low_bits(z);
     return axes_of(x / kQuatUnit, y / kQuatUnit, z / kQuatUnit);
@@ -111,20 +123,23 @@ void encode_leaf_extent(const std::array<Point3, 3>& axes, const Point3& lo, con
                         LeafRecord& leaf)
 {
     constexpr double kPerUnit = 1.0 / kLeafQuantum;
+    // The centre's last bits are noise: steps of 1/1024 of the box's longest side or less
+    const double longest = std::max({hi[0] - lo[0], hi[1] - lo[1], hi[2] - lo[2]}) * kPerUnit;
+    const int step = longest >= 2048 ? 1 << std::min(std::ilogb(longest) - 10, 6) : 1;
     int center[3], half[3];
     Point3 decoded{};
     for (int c = 0; c < 3; ++c) {
         double x = 0;
         for (int i = 0; i < 3; ++i)
             x += 0.5 * (lo[i] + hi[i]) * axes[i][c];
-        center[c] = to_int(x * kPerUnit, -32768, 32767);
+        center[c] = to_int(step * std::nearbyint(x * kPerUnit / step), -32768, 32767);
         decoded[c] = center[c] / kPerUnit;
     }
     for (int i = 0; i < 3; ++i) {
         // from the centre as it decodes to the farther side, rounded up
         const double at = dot3(decoded, axes[i]);
         const double reach = std::max(hi[i] - at, at - lo[i]) + margin;
-        half[i] = to_int(std::ceil(reach * kPerUnit), 0, 65535);
+        half[i] = seven_bits_up(to_int(std::ceil(reach * kPerUnit), 0, 65535));
     }
     leaf.center_xy = low_bits(center[0]) | low_bits(center[1]) << 16;
     leaf.center_z_half_x = low_bits(center[2]) | low_bits(half[0]) << 16;

@@ -47,6 +47,7 @@ inline constexpr uint16_t kCodecPlain = 0;
 inline constexpr uint16_t kCodecZstd = 1;
 inline constexpr uint16_t kFilterNone = 0;
 inline constexpr uint16_t kFilterColumns = 1;
+inline constexpr uint16_t kFilterPredicted = 2; // differences from what the words before lead to expect, in columns
 
 struct SectionEntry {
     char id[4];

@@ -3,6 +3,7 @@
 #include "format/derive.h"
 #include "format/pack_file.h"
 #include "format/pack_filter.h"
+#include "format/pack_predict.h"
 
 #include <algorithm>
 #include <atomic>
@@ -271,7 +272,7 @@ private:
         const size_t before = findings.size();
         if (known.stride == 0 && is_critical(id))
             fault(3121, id, "critical, and unknown to this reader");
-        if (e.codec > kCodecZstd || e.filter > kFilterColumns) {
+        if (e.codec > kCodecZstd || e.filter > kFilterPredicted) {
             if (known.stride != 0 || is_critical(id))
                 fault(3125, id, fmt::format("codec {}, filter {}: unknown to this reader", e.codec, e.filter));
             return findings.size() == before; // an ancillary section of the future is skipped, form and all
@@ -287,7 +288,9 @@ private:
         const bool has_columns = e.stride > 0 && e.stride % 4 == 0 && e.stride <= 4 * kMaxFilterColumns;
         const uint64_t allowed =
             e.filter == kFilterNone || !has_columns ? 0 : ~uint64_t{0} >> (kMaxFilterColumns - e.stride / 4);
-        if (e.filter == kFilterColumns && !has_columns)
+        if (e.filter == kFilterPredicted && !has_prediction(id))
+            fault(3126, id, "has no prediction to differ from");
+        else if (e.filter != kFilterNone && !has_columns)
             fault(3126, id, fmt::format("elements of {} bytes have no columns", e.stride));
         else if (((e.delta_columns | e.plane_columns) & ~allowed) != 0)
             fault(3126, id, "filters columns that it does not have");
@@ -401,7 +404,7 @@ private:
             target = target.first(std::min<size_t>(target.size(), frame_bytes));
             Bytes columns;
             std::span<std::byte> decoded = target;
-            if (e.filter == kFilterColumns) {
+            if (e.filter != kFilterNone) {
                 columns.resize(target.size());
                 decoded = columns;
             }
@@ -409,13 +412,15 @@ private:
                 damaged = i;
                 return;
             }
-            if (e.filter == kFilterColumns)
+            if (e.filter != kFilterNone)
                 unfilter_columns(columns, e.stride, {e.delta_columns, e.plane_columns}, target);
         });
         if (damaged != SIZE_MAX) {
             fault(3128, id_of(e), fmt::format("frame {} is damaged", damaged.load()));
             return false;
         }
+        if (e.filter == kFilterPredicted)
+            restore_records(id_of(e), pack.image, out);
         return true;
     }
 

@@ -2,6 +2,7 @@
 
 #include "format/pack_file.h"
 #include "format/pack_filter.h"
+#include "format/pack_predict.h"
 
 #include <algorithm>
 #include <cassert>
@@ -123,7 +124,24 @@ Bytes compress(ByteSpan decoded, const SectionEntry& entry, int level)
     return all;
 }
 
-Section make_section(std::string_view id, uint32_t stride, ByteSpan decoded, int level)
+/// The zstd form of the records, or of their differences from a prediction where there is one.
+void compress_section(const PackImage& image, ByteSpan decoded, int level, Section& section)
+{
+    SectionEntry& entry = section.entry;
+    const std::string_view id(entry.id, 4);
+    entry.codec = kCodecZstd;
+    const Bytes predicted = has_prediction(id) ? predict_records(id, image, decoded) : Bytes{};
+    const ByteSpan records = predicted.empty() ? decoded : ByteSpan(predicted);
+    const std::optional<ColumnFilter> filter = choose_filter(records, entry.stride);
+    if (filter) {
+        entry.delta_columns = filter->delta_columns;
+        entry.plane_columns = filter->plane_columns;
+    }
+    entry.filter = !predicted.empty() ? kFilterPredicted : filter ? kFilterColumns : kFilterNone;
+    section.stored = compress(records, entry, level_for(decoded.size(), level));
+}
+
+Section make_section(std::string_view id, uint32_t stride, ByteSpan decoded, int level, const PackImage& image)
 {
     Section section;
     SectionEntry& entry = section.entry;
@@ -132,15 +150,8 @@ Section make_section(std::string_view id, uint32_t stride, ByteSpan decoded, int
     entry.stride = stride;
     entry.count = decoded.size() / stride;
     entry.decoded_xxh3 = xxh3(decoded.data(), decoded.size());
-    if (level > 0) {
-        entry.codec = kCodecZstd;
-        if (const std::optional<ColumnFilter> filter = choose_filter(decoded, stride)) {
-            entry.filter = kFilterColumns;
-            entry.delta_columns = filter->delta_columns;
-            entry.plane_columns = filter->plane_columns;
-        }
-        section.stored = compress(decoded, entry, level_for(decoded.size(), level));
-    }
+    if (level > 0)
+        compress_section(image, decoded, level, section);
     if (level <= 0 || section.stored.size() >= decoded.size()) {
         section.stored.assign(decoded.begin(), decoded.end());
         entry.codec = kCodecPlain;
@@ -194,7 +205,7 @@ std::vector<Section> make_sections(const PackImage& image, int level)
     std::vector<Section> sections;
     const auto add = [&](std::string_view id, uint32_t stride, ByteSpan decoded) {
         if (!decoded.empty())
-            sections.push_back(make_section(id, stride, decoded, level));
+            sections.push_back(make_section(id, stride, decoded, level, image));
     };
     const FactRecord facts = facts_of(image);
     add(kSectionFacts, sizeof facts, std::as_bytes(std::span(&facts, 1)));

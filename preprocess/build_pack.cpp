@@ -143,6 +143,14 @@ void convert_surface(ConvertedFace& face, const PartFrame& frame)
         face.dropped_reason = "its surface gave no patch over its domain";
 }
 
+/// A measure that sizes things, to 12 bits (1e-4 of itself): no decision needs more, and noise does not compress.
+float rough(double x)
+{
+    int exponent = 0;
+    const double mantissa = std::frexp(x, &exponent);
+    return static_cast<float>(std::ldexp(std::nearbyint(std::ldexp(mantissa, 12)), exponent - 12));
+}
+
 FaceRecord face_record(const ConvertedFace& face, StringTable& strings)
 {
     const CadFace& cad = *face.cad;
@@ -153,11 +161,11 @@ FaceRecord face_record(const ConvertedFace& face, StringTable& strings)
     r.flags = (cad.reversed ? kFaceReversed : 0) | (face.trims.natural_border ? kFaceNaturalBorder : 0) |
               (cad.color_rgba ? kFaceHasColor : 0) | (cad.surface.deviation_mm > 0 ? kFaceApproximated : 0) |
               (face.trims.had_open_loop ? kFaceOpenLoop : 0);
-    r.area_mm2 = static_cast<float>(face.extent.area_mm2 * face.inside_fraction);
+    r.area_mm2 = rough(face.extent.area_mm2 * face.inside_fraction);
     r.tolerance_mm = static_cast<float>(cad.tolerance_mm);
     r.deviation_mm = static_cast<float>(cad.surface.deviation_mm);
-    r.extent_mm[0] = static_cast<float>(face.extent.length_u_mm);
-    r.extent_mm[1] = static_cast<float>(face.extent.length_v_mm);
+    r.extent_mm[0] = rough(face.extent.length_u_mm);
+    r.extent_mm[1] = rough(face.extent.length_v_mm);
     r.surface_kind = cad.surface.kind;
     r.loop_count = face.trims.loop_count;
     r.domain_lo[0] = face.trims.domain.lo.x;
@@ -302,7 +310,8 @@ void run(const CadModel& model, const BuildOptions& options, PackImage& image, B
     report.warnings = model.warnings;
 
     start = Clock::now();
-    add_proxy(model, face_ids, image, report);
+    if (!options.compact) // coarse triangles follow from the rest, and no thumbnail needs them
+        add_proxy(model, face_ids, image, report);
     report.proxy_seconds = seconds_since(start);
 }
 

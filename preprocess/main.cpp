@@ -110,7 +110,8 @@ Result<std::optional<Options>> parse_options(int argc, char** argv)
     app.add_option("--trim-layout", layout, "Texels with equal sides on the surface, or the paper's square textures")
         ->check(CLI::IsMember({"isotropic", "square"}))
         ->capture_default_str();
-    app.add_flag("--compact", options.build.compact, "Leave out what can be built again at load");
+    app.add_flag("--compact", options.build.compact,
+                 "Leave out what can be built again at load, the larger preview and the coarse triangles");
     app.add_flag("--heal", options.import.heal, "Run the CAD kernel's full shape healing (slow)");
     app.add_option("--timeout", options.limits.wall_seconds, "Seconds the conversion may take; 0: no limit")
         ->check(CLI::NonNegativeNumber)

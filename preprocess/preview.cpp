@@ -97,7 +97,8 @@ Status add_previews(PackImage& image, const std::string& trimray_program)
         return Error{ErrorCode::Internal, trimray_program,
                      fmt::format("no preview: `trimray preview` ended with status {}", status)};
     image.preview_256_png = std::move(small);
-    image.preview_512_png = std::move(large);
+    if (!image.compact) // a compact pack keeps what a file list shows
+        image.preview_512_png = std::move(large);
     return Done{};
 }
 

@@ -338,7 +338,8 @@ Result<GltfExport> export_gltf(const PackImage& image, const GltfOptions& option
 {
     if (image.proxy_draco.empty())
         return Error{ErrorCode::UnsupportedPackFeature, "section prox",
-                     "the pack has no proxy mesh to export; pack the model again without leaving it out"};
+                     image.compact ? "a compact pack has no coarse triangles; pack the model again without --compact"
+                                   : "the pack has no coarse triangles; pack the model again"};
     const Result<ProxyMesh> proxy = decode_proxy(image.proxy_draco, image.faces.size());
     if (!proxy.ok())
         return proxy.error();

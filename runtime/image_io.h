@@ -29,7 +29,11 @@ Status write_image(const std::string& path, const Frame& frame);
 Status check_image_name(const std::string& path);
 
 /// The bytes of the PNG or EXR that write_image writes. Fails: ImageNotWritten.
-Result<std::vector<std::byte>> encode_png(const Picture& picture);
+enum class PngForm {
+    Rgba,   // 8 bits a channel, what every program reads alike
+    Fewest, // a colour map where 256 colours are enough: a third of the bytes
+};
+Result<std::vector<std::byte>> encode_png(const Picture& picture, PngForm form = PngForm::Rgba);
 Result<std::vector<std::byte>> encode_exr(const Frame& frame);
 
 /// Fails: UnsupportedFormat (not a PNG, or a damaged one).

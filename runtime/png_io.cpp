@@ -4,8 +4,10 @@
 #include <fmt/format.h>
 #include <png.h>
 
+#include <algorithm>
 #include <cassert>
 #include <cstring>
+#include <set>
 
 namespace trimray {
 namespace {
@@ -26,9 +28,30 @@ struct PngControl {
     PngControl& operator=(const PngControl&) = delete;
 };
 
+/// A picture as numbers of its colours, in ascending order; no pixels where there are more than 256.
+struct ColourMap {
+    std::vector<uint32_t> colours; // R in the low byte
+    std::vector<uint8_t> pixels;
+};
+
+ColourMap map_colours(const Picture& picture)
+{
+    std::vector<uint32_t> words(picture.rgba.size() / 4);
+    std::memcpy(words.data(), picture.rgba.data(), picture.rgba.size());
+    std::set<uint32_t> distinct;
+    for (const uint32_t word : words)
+        if (distinct.insert(word).second && distinct.size() > 256)
+            return {};
+    ColourMap map{{distinct.begin(), distinct.end()}, {}};
+    for (const uint32_t word : words)
+        map.pixels.push_back(
+            static_cast<uint8_t>(std::lower_bound(map.colours.begin(), map.colours.end(), word) - map.colours.begin()));
+    return map;
+}
+
 } // namespace
 
-Result<std::vector<std::byte>> encode_png(const Picture& picture)
+Result<std::vector<std::byte>> encode_png(const Picture& picture, PngForm form)
 {
     assert(picture.rgba.size() == size_t{4} * picture.width * picture.height);
     PngControl png;
@@ -37,7 +60,14 @@ Result<std::vector<std::byte>> encode_png(const Picture& picture)
     png.image.format = PNG_FORMAT_RGBA; // 8 bits are sRGB with straight alpha
     std::vector<std::byte> bytes(PNG_IMAGE_PNG_SIZE_MAX(png.image));
     png_alloc_size_t size = bytes.size();
-    if (png_image_write_to_memory(&png.image, bytes.data(), &size, 0, picture.rgba.data(), 0, nullptr) == 0)
+    const void* pixels = picture.rgba.data();
+    const ColourMap map = form == PngForm::Fewest ? map_colours(picture) : ColourMap{};
+    if (!map.pixels.empty()) {
+        png.image.format = PNG_FORMAT_RGBA_COLORMAP;
+        png.image.colormap_entries = static_cast<png_uint_32>(map.colours.size());
+        pixels = map.pixels.data();
+    }
+    if (png_image_write_to_memory(&png.image, bytes.data(), &size, 0, pixels, 0, map.colours.data()) == 0)
         return Error{ErrorCode::ImageNotWritten, "PNG", png.image.message};
     bytes.resize(size);
     return bytes;

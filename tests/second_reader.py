@@ -70,6 +70,115 @@ def unfilter(frame, stride, delta, planes):
     return struct.pack(f"<{n * len(columns)}I", *(word for record in zip(*columns) for word in record))
 
 
+def unzigzag(word):
+    return word >> 1 ^ -(word & 1)
+
+
+def signed(word):
+    return (word + (1 << 31)) % (1 << 32) - (1 << 31)
+
+
+def restore_nets(content, contents):
+    words = list(struct.unpack(f"<{len(content) // 4}I", content))
+    end, patches = 0, contents.get("PTCH") or b""
+    for at in range(0, len(patches), 100):
+        shape, first = struct.unpack_from("<II", patches, at + 32)
+        nu, nv, rational = (shape >> 8 & 255) + 1, (shape >> 16 & 255) + 1, shape >> 24 & 1
+        width = 3 + rational
+        if shape & 255 != 5 or first < end or first + nu * nv * width > len(words):
+            continue
+        end = first + nu * nv * width
+        for c in range(width):
+            g = [[0] * nv for _ in range(nu)]
+
+            def on(i, j):  # along u
+                return g[i - 1][j] if i < 2 else 2 * g[i - 1][j] - g[i - 2][j]
+            for i in range(nu):
+                for j in range(nv):
+                    if i == 0:
+                        guess = 0 if j == 0 else g[0][0] if j == 1 else 2 * g[0][j - 1] - g[0][j - 2]
+                    else:
+                        guess = on(i, j) if j == 0 else on(i, j) + g[i][j - 1] - on(i, j - 1)
+                    n = first + (i * nv + j) * width + c
+                    g[i][j] = guess + unzigzag(words[n]) & 0xFFFFFFFF
+                    words[n] = g[i][j] if c == 3 else from_grid(g[i][j], 24 if rational else 22)
+    return struct.pack(f"<{len(words)}I", *words)
+
+
+def from_grid(k, bits):
+    return struct.unpack("<I", struct.pack("<f", signed(k) / (1 << bits)))[0]
+
+
+def restore_points(content, contents):
+    words, last = list(struct.unpack(f"<{len(content) // 4}I", content)), [0, 0]
+    for n, word in enumerate(words):
+        last[n % 2] = last[n % 2] + unzigzag(word) & 0xFFFFFFFF
+        words[n] = from_grid(last[n % 2], 22)
+    return struct.pack(f"<{len(words)}I", *words)
+
+
+def restore_textures(content, contents):
+    out, end, faces = bytearray(content), 0, contents["FACE"]
+    for at in range(0, len(faces), 136):
+        size, first_word = struct.unpack_from("<II", faces, at + 56)
+        width, first = ((size & 0xFFFF) + 3) // 4 * 4, 4 * first_word
+        count = width * (size >> 16)
+        if count == 0 or first < end or first + count > len(out):
+            continue
+        for n in range(count):
+            left = out[first + n - 1] if n % width else 0
+            upper = out[first + n - width] if n >= width else 0
+            guess = left + upper
+            if n % width and n >= width:
+                guess = max(0, min(255, guess - out[first + n - width - 1]))
+            out[first + n] = out[first + n] + guess & 255
+        end = first + count
+    return bytes(out)
+
+
+def restore_trees(content, contents):
+    nodes = [list(node) for node in struct.iter_unpack("<3I4B12B12B4I2I", content)]
+    path, root, leaves = [], 0, 0  # path: [node, slot] of nodes whose slots are not all passed
+    for n, node in enumerate(nodes):
+        origin, exponents = [0.0] * 3, [0, 0, 0, 0]
+        if not path:
+            root, leaves = n, 0
+        else:
+            (p, slot), parent = path[-1], nodes[path[-1][0]]
+            for c in range(3):
+                lo, hi = parent[7 + 4 * c + slot], parent[19 + 4 * c + slot]
+                base = struct.unpack("<f", struct.pack("<I", parent[c]))[0]
+                origin[c] = base + 2.0 ** (parent[3 + c] - 127) * lo
+                exponents[c] = parent[3 + c] + (hi - lo & 255).bit_length() - 8
+            parent[31 + slot] = n - root
+            path[-1][1] += 1
+        for c in range(3):
+            expected = struct.unpack("<I", struct.pack("<f", origin[c]))[0]
+            node[c] = expected + unzigzag(node[c]) & 0xFFFFFFFF
+            for k in range(4):
+                lo, hi = 7 + 4 * c + k, 19 + 4 * c + k
+                if node[31 + k] == 0:
+                    node[lo] ^= 255
+                else:
+                    node[hi] = node[hi] + node[lo] & 255
+        node[3:7] = [a + b & 255 for a, b in zip(node[3:7], exponents)]
+        path.append([n, 0])
+        while path and (path[-1][1] == 4 or nodes[path[-1][0]][31 + path[-1][1]] != 2):
+            if path[-1][1] == 4:
+                path.pop()
+                continue
+            at, slot = nodes[path[-1][0]], path[-1][1]
+            if at[31 + slot] == 1:
+                at[31 + slot], leaves = 0x80000000 | leaves, leaves + 1
+            else:
+                at[31 + slot] = 0xFFFFFFFF
+            path[-1][1] += 1
+    return b"".join(struct.pack("<3I4B12B12B4I2I", *node) for node in nodes)
+
+
+RESTORE = {"CTRL": restore_nets, "TPNT": restore_points, "NODE": restore_trees, "SDFW": restore_textures}
+
+
 def decompress(stored, entry):
     decoded = []
     frame_size = (1 << 20) // entry["stride"] * entry["stride"]
@@ -87,7 +196,7 @@ def decompress(stored, entry):
     return b"".join(decoded)
 
 
-def read_section(data, at, end):
+def read_section(data, at, end, contents):
     entry = dict(zip(("codec", "filter", "offset", "stored_size", "decoded_size", "count", "stride", "reserved", "delta",
                       "planes", "stored_xxh3", "decoded_xxh3"), struct.unpack_from("<HHQQQQIIQQQQ", data, at + 4)))
     entry["id"] = data[at:at + 4].decode("ascii")
@@ -103,6 +212,9 @@ def read_section(data, at, end):
     need(entry["stride"] == STRIDES[entry["id"]], entry["id"] + ": stride")
     need(entry["decoded_size"] == entry["count"] * entry["stride"] and entry["codec"] <= 1, entry["id"] + ": form")
     content = decompress(stored, entry) if entry["codec"] == 1 else stored
+    if entry["filter"] == 2:
+        need(entry["id"] in RESTORE and entry["codec"] == 1, entry["id"] + ": filter")
+        content = RESTORE[entry["id"]](content, contents)
     need(len(content) == entry["decoded_size"], entry["id"] + ": decoded size")
     need(xxh3(content) == entry["decoded_xxh3"], entry["id"] + ": decoded checksum")
     return entry, content
@@ -116,7 +228,7 @@ def read_pack(data):
     header, count = read_header(data)
     end, summary, sections, contents = 128 + 80 * count, b"", [], {}
     for i in range(count):
-        entry, content = read_section(data, 128 + 80 * i, end)
+        entry, content = read_section(data, 128 + 80 * i, end, contents)
         end = entry["offset"] + entry["stored_size"]
         summary += entry["id"].encode() + struct.pack("<QQ", entry["decoded_size"], entry["decoded_xxh3"])
         sections.append({key: entry[key] for key in ("id", "count", "stored_size", "decoded_size", "decoded_xxh3")})
@@ -144,6 +256,6 @@ if __name__ == "__main__":
     try:
         with open(sys.argv[1], "rb") as file:
             print(json.dumps(describe(*read_pack(file.read())), ensure_ascii=False))
-    except (Invalid, struct.error, UnicodeDecodeError) as error:
+    except (Invalid, struct.error, OverflowError, UnicodeDecodeError) as error:
         print(f"{sys.argv[1]}: not a valid pack: {error}", file=sys.stderr)
         sys.exit(3)

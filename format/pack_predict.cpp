@@ -1,0 +1,282 @@
+#include "format/pack_predict.h"
+
+#include <algorithm>
+#include <bit>
+#include <cassert>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+
+namespace trimray {
+namespace {
+
+enum class Way { Predict, Restore };
+
+uint zigzag(uint difference)
+{
+    return difference << 1 ^ (0u - (difference >> 31));
+}
+uint unzigzag(uint stored)
+{
+    return stored >> 1 ^ (0u - (stored & 1u));
+}
+
+/// The integer whose multiple of 2^-bits a float's word is; words that are none do not come back.
+uint to_grid(uint word, int bits)
+{
+    const double k = std::ldexp(std::bit_cast<float>(word), bits);
+    constexpr double kLargest = 1 << 30;
+    return k >= -kLargest && k <= kLargest ? static_cast<uint>(static_cast<int>(k)) : 0u;
+}
+uint from_grid(uint k, int bits)
+{
+    return std::bit_cast<uint>(static_cast<float>(std::ldexp(static_cast<int>(k), -bits)));
+}
+
+// ---- control nets and trim points ----------------------------------------------------------------------------------
+
+constexpr int kTrimBits = 22, kPolynomialBits = 22, kRationalBits = 24;
+
+/// What the net's point (i, j) should be from those before it: the second differences along u go on as they were, and
+/// differ from one column to the next as little. `at` is the net's numbers of one coordinate.
+template <class At>
+uint expected(const At& at, uint i, uint j)
+{
+    const auto along_v = [&](uint row) { return j < 2 ? at(row, j - 1) : 2u * at(row, j - 1) - at(row, j - 2); };
+    const auto along_u = [&](uint column) {
+        return i < 2 ? at(i - 1, column) : 2u * at(i - 1, column) - at(i - 2, column);
+    };
+    if (i == 0)
+        return j == 0 ? 0u : along_v(0);
+    return j == 0 ? along_u(0) : along_u(j) + at(i, j - 1) - along_u(j - 1);
+}
+
+/// One net in place, from floats to differences or back. `grid` has room for a net.
+void code_net(uint* words, uint count_u, uint count_v, bool rational, Way way, std::vector<uint>& grid)
+{
+    const uint width = rational ? 4 : 3, size = count_u * count_v * width;
+    const int bits = rational ? kRationalBits : kPolynomialBits;
+    grid.assign(size, 0);
+    if (way == Way::Predict)
+        for (uint n = 0; n < size; ++n)
+            grid[n] = n % width == 3 ? words[n] : to_grid(words[n], bits);
+    for (uint i = 0; i < count_u; ++i)
+        for (uint j = 0; j < count_v; ++j)
+            for (uint c = 0; c < width; ++c) {
+                const uint n = (i * count_v + j) * width + c;
+                const uint guess = expected([&](uint a, uint b) { return grid[(a * count_v + b) * width + c]; }, i, j);
+                if (way == Way::Restore)
+                    grid[n] = guess + unzigzag(words[n]);
+                else
+                    words[n] = zigzag(grid[n] - guess);
+            }
+    if (way == Way::Restore)
+        for (uint n = 0; n < size; ++n)
+            words[n] = n % width == 3 ? grid[n] : from_grid(grid[n], bits);
+}
+
+/// Nets in the order of their patches; words that no net holds stay as they are, and so does a net that lies before the
+/// end of another.
+void code_nets(const std::vector<PatchRecord>& patches, std::span<uint> words, Way way)
+{
+    std::vector<uint> grid;
+    size_t end = 0;
+    for (const PatchRecord& patch : patches) {
+        const uint count_u = (patch.shape >> 8 & 0xffu) + 1, count_v = (patch.shape >> 16 & 0xffu) + 1;
+        const bool rational = (patch.shape & kShapeRational) != 0;
+        const size_t first = patch.first_control_point, size = size_t{count_u} * count_v * (rational ? 4 : 3);
+        if ((patch.shape & 0xffu) != kKindBezier || first < end || first > words.size() || size > words.size() - first)
+            continue;
+        code_net(&words[first], count_u, count_v, rational, way, grid);
+        end = first + size;
+    }
+}
+
+/// Points as steps from the point before.
+void code_points(std::span<uint> words, Way way)
+{
+    uint before[2] = {0, 0};
+    for (size_t n = 0; n < words.size(); ++n) {
+        uint& last = before[n % 2];
+        if (way == Way::Predict) {
+            const uint k = to_grid(words[n], kTrimBits);
+            words[n] = zigzag(k - last);
+            last = k;
+        } else {
+            last += unzigzag(words[n]);
+            words[n] = from_grid(last, kTrimBits);
+        }
+    }
+}
+
+// ---- textures ------------------------------------------------------------------------------------------------------
+
+/// Bytes of each texture beside left + upper - upper left, cut to 0 ... 255. Padding is coded like texels.
+void code_textures(const std::vector<FaceRecord>& faces, std::span<std::byte> bytes, Way way)
+{
+    size_t end = 0;
+    std::vector<std::byte> texels;
+    for (const FaceRecord& face : faces) {
+        const size_t width = ((face.sdf_size & 0xffffu) + 3) / 4 * 4, height = face.sdf_size >> 16;
+        const size_t first = size_t{4} * face.sdf_first_word, size = width * height;
+        if (size == 0 || first < end || first > bytes.size() || size > bytes.size() - first)
+            continue;
+        std::byte* const coded = &bytes[first];
+        texels.assign(coded, coded + size);
+        const std::byte* const known = way == Way::Predict ? texels.data() : coded;
+        for (size_t n = 0; n < size; ++n) {
+            const bool has_left = n % width != 0, has_upper = n >= width;
+            const int left = has_left ? int(known[n - 1]) : 0, upper = has_upper ? int(known[n - width]) : 0;
+            int guess = left + upper; // of one that exists
+            if (has_left && has_upper)
+                guess = std::clamp(guess - int(known[n - width - 1]), 0, 255);
+            coded[n] = std::byte(way == Way::Predict ? int(texels[n]) - guess : int(coded[n]) + guess);
+        }
+        end = first + size;
+    }
+}
+
+// ---- trees ---------------------------------------------------------------------------------------------------------
+
+constexpr uint kSlotEmpty = 0, kSlotLeaf = 1, kSlotNode = 2;
+
+uint byte_of(uint word, uint k)
+{
+    return word >> 8 * k & 0xffu;
+}
+
+/// Bytes a - b or a + b, each modulo 256.
+uint add_bytes(uint a, uint b, bool subtract)
+{
+    uint out = 0;
+    for (uint k = 0; k < 4; ++k)
+        out |= ((byte_of(a, k) + (subtract ? 256 - byte_of(b, k) : byte_of(b, k))) & 0xffu) << 8 * k;
+    return out;
+}
+
+/// What a child's origin and exponents should be: the corner of its box in the parent, and the least step that spans
+/// it.
+void expect_from_parent(const BvhNode& parent, uint slot, BvhNode& guess)
+{
+    for (int c = 0; c < 3; ++c) {
+        const uint biased = byte_of(parent.exponents, c), lo = byte_of(parent.lo[c], slot);
+        guess.origin[c] = parent.origin[c] + std::ldexp(1.0f, int(biased) - 127) * float(lo);
+        const uint extent = (byte_of(parent.hi[c], slot) - lo) & 0xffu;
+        guess.exponents |= ((biased + uint(std::bit_width(extent)) - 8u) & 0xffu) << 8 * c;
+    }
+}
+
+/// A node's own words, without its children. `empty` has 255 in the bytes of slots without a child.
+void code_node(BvhNode& node, const BvhNode& guess, uint empty, Way way)
+{
+    const bool predict = way == Way::Predict;
+    for (int c = 0; c < 3; ++c) {
+        const uint origin = std::bit_cast<uint>(node.origin[c]), expected_origin = std::bit_cast<uint>(guess.origin[c]);
+        node.origin[c] =
+            std::bit_cast<float>(predict ? zigzag(origin - expected_origin) : expected_origin + unzigzag(origin));
+        // an empty slot has lo = 255 and hi = 0: both become 0
+        const uint lo = predict ? node.lo[c] : node.lo[c] ^ empty;
+        node.hi[c] = add_bytes(node.hi[c], lo & ~empty, predict);
+        node.lo[c] ^= empty;
+    }
+    node.exponents = add_bytes(node.exponents, guess.exponents, predict);
+}
+
+/// Children's words are kinds of slots here; their numbers follow from the order: nodes and leaves in the order of a
+/// walk from the root that takes slots in turn.
+void code_trees(std::span<BvhNode> nodes, Way way)
+{
+    struct Visit {
+        uint node, slot;
+    };
+    std::vector<Visit> path;
+    const std::vector<BvhNode> before(way == Way::Predict ? nodes.begin() : nodes.end(), nodes.end());
+    const auto known = [&](uint n) -> const BvhNode& { return way == Way::Predict ? before[n] : nodes[n]; };
+    uint root = 0, leaves = 0;
+    for (uint n = 0; n < nodes.size(); ++n) {
+        BvhNode guess{};
+        if (path.empty()) {
+            root = n;
+            leaves = 0;
+        } else {
+            Visit& parent = path.back();
+            expect_from_parent(known(parent.node), parent.slot, guess);
+            if (way == Way::Restore)
+                nodes[parent.node].child[parent.slot] = n - root;
+            ++parent.slot;
+        }
+        uint kind[4], empty = 0;
+        for (uint k = 0; k < 4; ++k) {
+            const uint word = nodes[n].child[k];
+            kind[k] = way == Way::Restore      ? word
+                      : word == kBvhEmpty      ? kSlotEmpty
+                      : (word & kBvhLeaf) != 0 ? kSlotLeaf
+                                               : kSlotNode;
+            nodes[n].child[k] = kind[k];
+            empty |= kind[k] == kSlotEmpty ? 0xffu << 8 * k : 0u;
+        }
+        code_node(nodes[n], guess, empty, way);
+        path.push_back({n, 0});
+        while (!path.empty()) { // to the next slot that holds a node
+            Visit& at = path.back();
+            if (at.slot == 4) {
+                path.pop_back();
+                continue;
+            }
+            uint& word = nodes[at.node].child[at.slot];
+            if (word == kSlotNode)
+                break;
+            if (way == Way::Restore)
+                word = word == kSlotLeaf ? kBvhLeaf | leaves++ : kBvhEmpty;
+            ++at.slot;
+        }
+    }
+}
+
+/// f(span of T) over a copy of the records that lies as T needs it.
+template <class T, class F>
+void on_array(std::span<std::byte> records, F&& f)
+{
+    std::vector<T> array(records.size() / sizeof(T));
+    std::memcpy(array.data(), records.data(), array.size() * sizeof(T));
+    f(std::span<T>(array));
+    std::memcpy(records.data(), array.data(), array.size() * sizeof(T));
+}
+
+void code_records(std::string_view id, const PackImage& image, std::span<std::byte> records, Way way)
+{
+    assert(has_prediction(id) && "no other section has filter 2");
+    if (id == "CTRL")
+        on_array<uint>(records, [&](std::span<uint> words) { code_nets(image.patches, words, way); });
+    else if (id == "TPNT")
+        on_array<uint>(records, [&](std::span<uint> words) { code_points(words, way); });
+    else if (id == "NODE")
+        on_array<BvhNode>(records, [&](std::span<BvhNode> nodes) { code_trees(nodes, way); });
+    else
+        code_textures(image.faces, records, way);
+}
+
+} // namespace
+
+bool has_prediction(std::string_view id)
+{
+    return id == "CTRL" || id == "TPNT" || id == "NODE" || id == "SDFW";
+}
+
+std::vector<std::byte> predict_records(std::string_view id, const PackImage& image, std::span<const std::byte> records)
+{
+    std::vector<std::byte> coded(records.begin(), records.end());
+    code_records(id, image, coded, Way::Predict);
+    std::vector<std::byte> back = coded;
+    code_records(id, image, back, Way::Restore);
+    if (!std::equal(back.begin(), back.end(), records.begin(), records.end()))
+        coded.clear();
+    return coded;
+}
+
+void restore_records(std::string_view id, const PackImage& image, std::span<std::byte> records)
+{
+    code_records(id, image, records, Way::Restore);
+}
+
+} // namespace trimray
