@@ -353,9 +353,9 @@ void Oracle::Impl::build_tree()
     }
 }
 
-OracleHit Oracle::Impl::closest(const Ray& ray, bool boundary_tolerance) const
+OracleHit Oracle::Impl::closest(const Ray& ray) const
 {
-    Intersectors& mine = (boundary_tolerance ? intersectors : strict_intersectors).local();
+    Intersectors& mine = intersectors.local();
     mine.resize(unique.size());
     OracleHit best;
     std::vector<std::pair<double, uint32_t>> open; // entry distance, node; nearest at the back
@@ -389,7 +389,7 @@ OracleHit Oracle::Impl::closest(const Ray& ray, bool boundary_tolerance) const
                 auto& intersector = mine[face.unique];
                 if (!intersector)
                     intersector = std::make_unique<IntCurvesFace_Intersector>(
-                        unique[face.unique], kIntersectorTolerance, true, boundary_tolerance);
+                        unique[face.unique], kIntersectorTolerance, true, options.boundary_tolerance);
                 gp_Pnt p(ray.origin[0], ray.origin[1], ray.origin[2]);
                 p.Transform(face.to_local);
                 gp_Dir d(ray.direction[0], ray.direction[1], ray.direction[2]);
@@ -449,7 +449,7 @@ std::vector<OracleHit> Oracle::cast(std::span<const Ray> rays) const
     std::vector<OracleHit> hits(rays.size());
     tbb::parallel_for(tbb::blocked_range<size_t>(0, rays.size(), 64), [&](const tbb::blocked_range<size_t>& range) {
         for (size_t i = range.begin(); i != range.end(); ++i)
-            hits[i] = impl_->closest(rays[i], impl_->options.boundary_tolerance);
+            hits[i] = impl_->closest(rays[i]);
     });
     return hits;
 }

@@ -4,6 +4,7 @@
 
 #include <BRepAdaptor_Surface.hxx>
 #include <BRepBuilderAPI_MakeVertex.hxx>
+#include <BRepClass_FaceClassifier.hxx>
 #include <BRepExtrema_DistShapeShape.hxx>
 #include <BRepGProp_Face.hxx>
 #include <BRep_Tool.hxx>
@@ -28,8 +29,7 @@ Point along(const Ray& ray, double t)
             ray.origin[2] + t * ray.direction[2]};
 }
 
-// Faces widened by a tolerance in parameters reach farther where the parameters are stretched; beyond this share of the
-// diagonal no such excuse is taken.
+// The kernel's polygons follow curves this closely; beyond this share of the diagonal no such excuse is taken.
 constexpr double kNearEdge = 1e-4;
 // Where a surface bends, a ray this flat dips under it by cos^2/2 of the radius of curvature only.
 constexpr double kGrazingCosine = 0.05;
@@ -129,6 +129,15 @@ struct Explainer {
         return std::abs(normal.Normalized() * d);
     }
 
+    /// Whether the hit lies outside of its face's curves themselves. The intersector goes by polygons of the curves,
+    /// widened by a tolerance in parameters; this classifier intersects with the curves.
+    bool outside_exactly(const OracleHit& hit) const
+    {
+        constexpr double kNoTolerance = 1e-12;
+        const TopoDS_Face& face = oracle.unique[oracle.placed[size_t(hit.face)].unique];
+        return BRepClass_FaceClassifier(face, gp_Pnt2d(hit.u, hit.v), kNoTolerance).State() == TopAbs_OUT;
+    }
+
     /// Six rays turned by `angle_rad` about two axes: does any of the kernel's answers agree with ours?
     bool turned_agrees(const Ray& ray, double ours_mm, double angle_rad) const
     {
@@ -137,8 +146,7 @@ struct Explainer {
         for (int k = 0; k < 6; ++k) {
             const double around = k * 1.0471975511965976; // 60 degrees
             const gp_Vec turned = (d + (a * std::cos(around) + b * std::sin(around)) * angle_rad).Normalized();
-            const OracleHit hit =
-                oracle.closest({ray.origin, {turned.X(), turned.Y(), turned.Z()}}, oracle.options.boundary_tolerance);
+            const OracleHit hit = oracle.closest({ray.origin, {turned.X(), turned.Y(), turned.Z()}});
             if (agrees(ours_mm, hit.distance_mm))
                 return true;
         }
@@ -205,12 +213,11 @@ struct Explainer {
             record(our_face, at_ours);
             found.cause = Cause::Edge;
             found.why = "our hit lies within an edge's tolerance";
-        } else if (oracle.options.boundary_tolerance &&
-                   std::min(at_oracle.edge_distance_mm, at_ours.edge_distance_mm) <= kNearEdge * diagonal_mm &&
-                   agrees(ours_mm, oracle.closest(ray, false).distance_mm)) {
-            record(hit.hit() ? hit.face : our_face, hit.hit() ? at_oracle : at_ours);
+        } else if (hit.hit() && at_oracle.edge_distance_mm <= kNearEdge * diagonal_mm && outside_exactly(hit)) {
+            record(hit.face, at_oracle);
             found.cause = Cause::Edge;
-            found.why = "near an edge, and the kernel agrees when it does not widen faces by their tolerance";
+            found.why =
+                "the oracle widens or flattens its curves: its hit lies outside of them by the kernel's own classifier";
             // 2. grazing
         } else if (hit.hit() && hit.distance_mm < ours_mm + on_face_mm && at_oracle.cos_incidence >= 0 &&
                    at_oracle.cos_incidence < oracle.options.tangent_cosine) {

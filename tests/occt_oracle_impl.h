@@ -42,11 +42,10 @@ struct Oracle::Impl {
     // The kernel's intersectors keep state: each thread has its own, made when first needed.
     using Intersectors = std::vector<std::unique_ptr<IntCurvesFace_Intersector>>;
     mutable tbb::enumerable_thread_specific<Intersectors> intersectors;
-    mutable tbb::enumerable_thread_specific<Intersectors> strict_intersectors; // without boundary tolerance
 
     void gather_faces(const TopoDS_Shape& shape);
     void build_tree();
-    OracleHit closest(const Ray& ray, bool boundary_tolerance) const;
+    OracleHit closest(const Ray& ray) const;
     /// Placed faces whose padded boxes come within `margin` of the point.
     std::vector<uint32_t> faces_around(const Point& p, double margin) const;
 };
