@@ -29,8 +29,6 @@ SHARED_OPEN
 constexpr float kDomainSlack = 4e-6f;
 // Newton may end outside of its patch by this much of uv_patch, so that neighbours overlap
 constexpr float kUvOverlap = 1e-5f;
-constexpr int kNewtonSteps = 12;
-constexpr float kSmallResidual = 4e-6f; // patch units: the rounding of a point with |q| about 1
 
 class BlockTracer {
 public:
@@ -249,8 +247,7 @@ private:
         const bool rational = (patch.shape & kShapeRational) != 0;
         const real2 middle = scalar2(0.5f * (box.uv_lo.x + box.uv_hi.x), 0.5f * (box.uv_lo.y + box.uv_hi.y));
         const RayPlanes planes = ray_planes(origin, direction);
-        // a step from this far ends within its square, times the leaf's curvature: 6e-8 is below rounding
-        const scalar enough = min(max(job_.error_px * target.view.pixel, 1e-6f), 2.4e-4f);
+        const scalar enough = last_residual(job_.error_px * target.view.pixel);
         const NewtonPatch newton{patch.first_control_point, degree_u, degree_v, rational, enough, box, planes,
                                  base + per_t * in_box.near};
         const mask grazing = newton_from(target, newton, middle, moving, origin, direction, hit);
@@ -258,12 +255,8 @@ private:
         mask again = (box.flags & kLeafFlagged) != 0 ? moving : grazing;
         if (!any_lane(again))
             return;
-        constexpr float kStarts[4][2] = {{0.1f, 0.1f}, {0.9f, 0.9f}, {0.1f, 0.9f}, {0.9f, 0.1f}};
-        for (const auto& [s, t] : kStarts) {
-            const real2 start =
-                scalar2(box.uv_lo.x + s * (box.uv_hi.x - box.uv_lo.x), box.uv_lo.y + t * (box.uv_hi.y - box.uv_lo.y));
-            newton_from(target, newton, start, again, origin, direction, hit);
-        }
+        for (int i = 0; i < kMoreStarts; ++i)
+            newton_from(target, newton, newton_start(i, box.uv_lo, box.uv_hi), again, origin, direction, hit);
     }
 
     struct NewtonPatch {
@@ -293,8 +286,7 @@ private:
             within_pixel = select(moving, next.residual <= newton.enough, within_pixel);
             const real2 to = real2(kept_near_leaf(next.uv.x, box.uv_lo.x, box.uv_hi.x),
                                    kept_near_leaf(next.uv.y, box.uv_lo.y, box.uv_hi.y));
-            // at the bounds of its reach, and drawn outwards: the root is not here
-            const mask stuck = next.singular || (to.x == uv.x && to.y == uv.y);
+            const mask stuck = newton_stuck(next, uv, to);
             uv = select(moving, to, uv);
             grazing = select(moving, next.grazing, grazing);
             settled = settled || (moving && close);

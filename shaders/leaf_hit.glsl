@@ -4,17 +4,12 @@
 const float kDomainSlack = 4e-6f;
 // Newton may end outside of its patch by this much of uv_patch, so that neighbours overlap
 const float kUvOverlap = 1e-5f;
-const int kNewtonSteps = 12;
-// Newton's last step is the one from a residual below this, in patch units; it ends within its square times the leaf's
-// curvature: 6e-8 is below rounding
-const float kLargestLastResidual = 2.4e-4f;
-const float kLeastResidual = 1e-6f;    // asked for before the last step,
-const float kAcceptedResidual = 4e-6f; // and accepted after it: rounding of a point with |q| about 1
 const float kBoxMargin = 1e-6f; // patch units: the ray's rounding, and the box's
 const uint kCurveIterations = 32u;             // bound of left_of_cubic
 const uint kTorusIterations = 3u * 24u + 4u * 32u; // bound of torus_roots
 
-// Where loops are limited, one leaf may take so many iterations: 13 steps at degree 25, and a few hundred trim pieces
+// Where loops are limited, one leaf may take so many iterations: 13 steps at degree 25, and a few hundred trim pieces.
+// Where the degree is high, the later ones of Newton's starts may have to be left out, and the hit is in doubt.
 const uint kRoundIterations = 20000u;
 bool overrun = false; // a leaf took more
 
@@ -198,48 +193,85 @@ void copy_control_points(PatchRecord patch, uint count)
     iterations += count;
 }
 
-// Newton from the leaf's middle. A last step follows the residual that is small enough; what it ends at is accepted
-// anywhere on the patch, so that leaves leave no gaps.
-void bezier_hit(PatchRay ray, PatchRecord patch, FaceRecord face, LeafBox box, float box_past, uint leaf, uint instance,
-                inout Hit hit)
+struct NewtonPatch {
+    uint degree_u;
+    uint degree_v;
+    bool rational;
+    float enough;   // residual of the last step but one, patch units
+    float box_past; // where the leaf's box begins
+    uint work;      // loop iterations of a step
+    RayPlanes planes;
+};
+
+// Newton from one start. A last step follows the residual that is small enough; what it ends at is accepted anywhere on
+// the patch, so that leaves leave no gaps. Returns true where the ray grazed the surface at last.
+bool newton_from(PatchRay ray, PatchRecord patch, FaceRecord face, LeafBox box, NewtonPatch newton, vec2 uv, uint leaf,
+                 uint instance, inout Hit hit)
 {
-    uint degree_u = (patch.shape >> 8) & 0xffu;
-    uint degree_v = (patch.shape >> 16) & 0xffu;
-    bool rational = has_feature(kFeatureRational) && (patch.shape & kShapeRational) != 0u;
-    if (local_floats > 0u)
-        copy_control_points(patch, (degree_u + 1u) * (degree_v + 1u) * (rational ? 4u : 3u));
-    RayPlanes planes = ray_planes(ray.origin, ray.direction);
-    vec2 middle = 0.5f * (box.uv_lo + box.uv_hi);
-    float enough = clamp(view.error_px * ray.pixel, kLeastResidual, kLargestLastResidual);
-    uint work = 1u + bezier_iterations(degree_u, degree_v);
-    vec2 uv = middle;
     bool settled = false;
+    bool grazing = false;
     for (int step = 0; step <= kNewtonSteps; ++step) {
-        SurfacePoint s = bezier_point(patch.first_control_point, int(degree_u), int(degree_v), rational, uv);
-        NewtonStep next = newton_step(s, planes, uv);
-        iterations += work;
+        SurfacePoint s =
+            bezier_point(patch.first_control_point, int(newton.degree_u), int(newton.degree_v), newton.rational, uv);
+        NewtonStep next = newton_step(s, newton.planes, uv);
+        iterations += newton.work;
         if (settled) {
             // not `precise`: glslc follows precise values around this loop for ever
             float t = dot(s.p - ray.origin, ray.direction) / dot(ray.direction, ray.direction);
-            if (next.residual <= max(enough, kAcceptedResidual) && in_range(ray, t, hit))
+            if (next.residual <= max(newton.enough, kSmallResidual) && in_range(ray, t, hit))
                 offer(ray, face, leaf, instance, t, uv, face_uv(patch, kKindBezier, uv), hit);
-            return;
+            return grazing;
         }
-        if (step == kNewtonSteps)
-            break;
         ++newton_steps;
-        settled = next.residual <= enough;
+        grazing = next.grazing;
+        // near a double root the steps only halve the residual, so there it must be small before the last one
+        settled = next.residual <= (grazing ? kSmallResidual : newton.enough);
         vec2 to = vec2(kept_near_leaf(next.uv.x, box.uv_lo.x, box.uv_hi.x),
                        kept_near_leaf(next.uv.y, box.uv_lo.y, box.uv_hi.y));
-        // at the bounds of its reach, and drawn outwards: the root is not here
-        if (!settled && (next.singular || to == uv))
-            return;
+        if (!settled && newton_stuck(next, uv, to))
+            return grazing;
         uv = to;
+        if (!settled && step == kNewtonSteps - 1) {
+            grazing = true;
+            settled = next.residual <= newton.enough; // a tangent ray
+            if (!settled)
+                hit.doubt = min(hit.doubt, newton.box_past);
+        }
         vec2 off = abs(uv - 0.5f);
-        if (settled && max(off.x, off.y) > 0.5f + kUvOverlap)
-            return;
+        if (settled ? max(off.x, off.y) > 0.5f + kUvOverlap : step == kNewtonSteps - 1)
+            return grazing;
     }
-    hit.doubt = min(hit.doubt, box_past);
+    return grazing;
+}
+
+// Newton from the leaf's middle, and from its other starts where it may hold more roots than one
+void bezier_hit(PatchRay ray, PatchRecord patch, FaceRecord face, LeafBox box, float box_past, uint leaf, uint instance,
+                inout Hit hit)
+{
+    NewtonPatch newton;
+    newton.degree_u = (patch.shape >> 8) & 0xffu;
+    newton.degree_v = (patch.shape >> 16) & 0xffu;
+    newton.rational = has_feature(kFeatureRational) && (patch.shape & kShapeRational) != 0u;
+    if (local_floats > 0u)
+        copy_control_points(patch, (newton.degree_u + 1u) * (newton.degree_v + 1u) * (newton.rational ? 4u : 3u));
+    newton.planes = ray_planes(ray.origin, ray.direction);
+    newton.enough = last_residual(view.error_px * ray.pixel);
+    newton.box_past = box_past;
+    newton.work = 1u + bezier_iterations(newton.degree_u, newton.degree_v);
+    vec2 uv = 0.5f * (box.uv_lo + box.uv_hi);
+    bool again = (box.flags & kLeafFlagged) != 0u;
+    for (int start = 0; start <= kMoreStarts; ++start) {
+        if (start > 0 && iteration_limit > 0u && iterations + uint(kNewtonSteps + 1) * newton.work > kRoundIterations) {
+            hit.doubt = min(hit.doubt, box_past);
+            return;
+        }
+        bool grazing = newton_from(ray, patch, face, box, newton, uv, leaf, instance, hit);
+        if (start == 0)
+            again = again || grazing;
+        if (!again)
+            return;
+        uv = newton_start(start, box.uv_lo, box.uv_hi);
+    }
 }
 
 void leaf_hit(uint leaf, uint instance_index, FrameInstance instance, vec2 pixel, inout Hit hit)

@@ -187,6 +187,27 @@ TEST(derive_leaves, a_flat_quarter_patch_is_one_leaf_with_a_flat_box)
     EXPECT_LE(half[2], 0.75 * (1 + 1.0 / 64) + 3 * kLeafQuantum);
 }
 
+TEST(derive_leaves, a_side_that_meets_in_one_point_but_for_rounding_is_no_reason_to_split)
+{
+    // a quarter of a cone: the row u = 0 is its apex, whose points differ in their last digit
+    const float eps = 5.9604645e-8f, w = 0.70710678f;
+    PatchRecord patch{};
+    patch.shape = kKindBezier | 1u << 8 | 2u << 16 | kShapeRational;
+    patch.scale = 1;
+    PackImage image;
+    image.patches.push_back(patch);
+    image.control_points = {0.5f,  0.5f + eps, 0.5f - eps, 1,         w * 0.5f, w * 0.5f, w * (0.5f + eps),
+                            w,     0.5f - eps, 0.5f,       0.5f,      1,        0.25f,    0,
+                            0,     1,          w * 0.25f,  w * 0.25f, 0,        w,        0,
+                            0.25f, 0,          1};
+    image.parts.push_back({});
+    image.parts[0].patch_count = 1;
+    derive_leaves(image, LeafOptions{});
+    EXPECT_LE(image.leaves.size(), 64u);
+    for (const LeafRecord& leaf : image.leaves)
+        EXPECT_EQ(leaf.quat_z_flags >> 16 & kLeafFlagged, 0u);
+}
+
 TEST(derive_leaves, one_thread_and_two_give_the_same_leaves)
 {
     PackImage one = random_pack(8, 6, 12), two = one;

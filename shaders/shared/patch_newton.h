@@ -38,6 +38,27 @@ FN RayPlanes ray_planes(real3 origin, real3 direction)
 // two roots.
 const scalar kGrazing = 0.15f;
 
+const int kNewtonSteps = 12;
+// Rounding of a point with |q| about 1, patch units: a point so near its ray is on it. A step from a larger residual
+// ends within its square times the leaf's curvature: from kLargestLastResidual within 6e-8, below rounding.
+const scalar kSmallResidual = 4e-6f;
+const scalar kLargestLastResidual = 2.4e-4f;
+
+// The residual below which one more step ends the iteration. `error`: asked for, patch units
+FN scalar last_residual(scalar error)
+{
+    return min(max(error, kSmallResidual), kLargestLastResidual);
+}
+
+// Where a leaf may hold more roots than one, Newton starts in its middle and then at these places, 0 to 3
+FN scalar2 newton_start(int index, scalar2 leaf_lo, scalar2 leaf_hi)
+{
+    scalar s = index == 0 || index == 2 ? 0.1f : 0.9f;
+    scalar t = index == 0 || index == 3 ? 0.1f : 0.9f;
+    return scalar2(leaf_lo.x + s * (leaf_hi.x - leaf_lo.x), leaf_lo.y + t * (leaf_hi.y - leaf_lo.y));
+}
+const int kMoreStarts = 4;
+
 struct NewtonStep {
     real2 uv;      // after the step; may leave [0,1]^2, the caller decides
     real residual; // before the step: distance of the point from the ray, patch units
@@ -77,6 +98,19 @@ FN real kept_near_leaf(real u, scalar leaf_lo, scalar leaf_hi)
     scalar middle = 0.5f * (leaf_lo + leaf_hi);
     scalar reach = kNewtonReach * (middle - leaf_lo);
     return clamp(u, real(max(middle - reach, -kNewtonOutside)), real(min(middle + reach, 1.0f + kNewtonOutside)));
+}
+
+// A step from uv to `to`, shorter than this (uv_patch) because it was cut: the patch's rounding, |S_u| and |S_v| about
+// 1
+const scalar kNewtonStill = 2e-6f;
+
+// True where no root is to be had: the step was not taken, or the iterate stands at the bounds of its reach and is
+// drawn outwards. Along the bound it may still tremble by rounding.
+FN mask newton_stuck(NewtonStep next, real2 uv, real2 to)
+{
+    mask inside = to.x == next.uv.x && to.y == next.uv.y;
+    mask still = abs(to.x - uv.x) <= kNewtonStill && abs(to.y - uv.y) <= kNewtonStill;
+    return next.singular || (!inside && still);
 }
 
 SHARED_CLOSE
