@@ -124,21 +124,27 @@ Bytes compress(ByteSpan decoded, const SectionEntry& entry, int level)
     return all;
 }
 
-/// The zstd form of the records, or of their differences from a prediction where there is one.
+/// The zstd form of the records: as they are, or as differences from their prediction where that is smaller (where much
+/// repeats, it is not).
 void compress_section(const PackImage& image, ByteSpan decoded, int level, Section& section)
 {
-    SectionEntry& entry = section.entry;
-    const std::string_view id(entry.id, 4);
-    entry.codec = kCodecZstd;
+    const std::string_view id(section.entry.id, 4);
     const Bytes predicted = has_prediction(id) ? predict_records(id, image, decoded) : Bytes{};
-    const ByteSpan records = predicted.empty() ? decoded : ByteSpan(predicted);
-    const std::optional<ColumnFilter> filter = choose_filter(records, entry.stride);
-    if (filter) {
-        entry.delta_columns = filter->delta_columns;
-        entry.plane_columns = filter->plane_columns;
+    for (const ByteSpan records : {decoded, ByteSpan(predicted)}) {
+        if (records.empty())
+            continue;
+        SectionEntry entry = section.entry;
+        const std::optional<ColumnFilter> filter = choose_filter(records, entry.stride);
+        entry.codec = kCodecZstd;
+        entry.filter = records.data() == predicted.data() ? kFilterPredicted : filter ? kFilterColumns : kFilterNone;
+        entry.delta_columns = filter ? filter->delta_columns : 0;
+        entry.plane_columns = filter ? filter->plane_columns : 0;
+        Bytes stored = compress(records, entry, level_for(decoded.size(), level));
+        if (section.stored.empty() || stored.size() < section.stored.size()) {
+            section.entry = entry;
+            section.stored = std::move(stored);
+        }
     }
-    entry.filter = !predicted.empty() ? kFilterPredicted : filter ? kFilterColumns : kFilterNone;
-    section.stored = compress(records, entry, level_for(decoded.size(), level));
 }
 
 Section make_section(std::string_view id, uint32_t stride, ByteSpan decoded, int level, const PackImage& image)
