@@ -9,6 +9,7 @@
 #define TRIMRAY_CPU_PACKET_H
 #endif
 
+#include "runtime/cpu_evaluate.h"
 #include "runtime/cpu_fetch.h"
 #include "runtime/cpu_lanes.h"
 #include "runtime/cpu_write.h"
@@ -244,12 +245,12 @@ private:
             return;
         const PatchRecord& patch = target.patch;
         const int degree_u = int(patch.shape >> 8 & 0xffu), degree_v = int(patch.shape >> 16 & 0xffu);
-        const bool rational = (patch.shape & kShapeRational) != 0;
         const real2 middle = scalar2(0.5f * (box.uv_lo.x + box.uv_hi.x), 0.5f * (box.uv_lo.y + box.uv_hi.y));
         const RayPlanes planes = ray_planes(origin, direction);
         const scalar enough = last_residual(job_.error_px * target.view.pixel);
-        const NewtonPatch newton{patch.first_control_point, degree_u, degree_v, rational, enough, box, planes,
-                                 base + per_t * in_box.near};
+        const NewtonPatch newton{
+            patch.first_control_point, degree_u, degree_v, find_evaluate(patch.shape), enough, box, planes,
+            base + per_t * in_box.near};
         const mask grazing = newton_from(target, newton, middle, moving, origin, direction, hit);
         // where a leaf may hold more roots than one: the rest of its starts, for the rays that this concerns
         mask again = (box.flags & kLeafFlagged) != 0 ? moving : grazing;
@@ -262,7 +263,7 @@ private:
     struct NewtonPatch {
         uint first_control_point;
         int degree_u, degree_v;
-        bool rational;
+        Evaluate evaluate;
         scalar enough; // residual of the last step but one, patch units
         const LeafBox& box;
         const RayPlanes& planes;
@@ -318,10 +319,9 @@ private:
         return grazing;
     }
 
-    HWY_ATTR HWY_NOINLINE SurfacePoint evaluate(const NewtonPatch& patch, real2 uv) const
+    HWY_ATTR SurfacePoint evaluate(const NewtonPatch& patch, real2 uv) const
     {
-        const FetchSource& source = source_;
-        return bezier_point(FETCH_PASS patch.first_control_point, patch.degree_u, patch.degree_v, patch.rational, uv);
+        return patch.evaluate(source_, patch.first_control_point, patch.degree_u, patch.degree_v, uv);
     }
 
     /// Takes the roots that lie in the face's domain and inside its trims.

@@ -129,6 +129,53 @@ TEST(cpu_tracer, gives_the_same_bits_on_every_instruction_set)
     EXPECT_FALSE(make_cpu_tracer(scene, "mmx").ok());
 }
 
+/// Curved patches of all degrees up to 3, polynomial and rational, side by side; nothing but their borders ends them.
+TracedScene small_degrees()
+{
+    TracedScene scene;
+    for (int k = 0; k < 18; ++k) {
+        const int degree_u = k % 3 + 1, degree_v = k / 3 % 3 + 1;
+        const bool rational = k >= 9;
+        scene.add_bezier(degree_u, degree_v, rational, 0.14, {0.3 * (k % 6) - 0.75, 0.3 * (k / 6) - 0.3, 0});
+        for (int i = 0; i <= degree_u; ++i) {
+            for (int j = 0; j <= degree_v; ++j) {
+                const float x = 2.0f * float(i) / float(degree_u) - 1, y = 2.0f * float(j) / float(degree_v) - 1;
+                const float w = rational ? 0.6f + 0.3f * float((i + 2 * j) % 2) : 1;
+                const float z = 0.35f * float((i * 2 + j) % 3) - 0.3f * x * y;
+                scene.image.control_points.insert(scene.image.control_points.end(), {w * x, w * y, w * z});
+                if (rational)
+                    scene.image.control_points.push_back(w);
+            }
+        }
+    }
+    return scene;
+}
+
+TEST(cpu_tracer, patches_of_small_degree_give_the_same_bits_on_every_instruction_set)
+{
+    const auto scene = small_degrees().finish();
+    const Camera camera = looking({5, -14, 16}, {0, 0, 0}, 52);
+    const Traced base = render(scene, camera, 301, 203);
+    EXPECT_GT(hits_of(base.frame), 6000u);
+    for (const char* set : {"avx512", "avx2", "sse4"}) {
+        if (!make_cpu_tracer(scene, set).ok())
+            continue;
+        const Traced other = render(scene, camera, 301, 203, TrimMode::Exact, set);
+        EXPECT_TRUE(same_bits(base.frame.depth_mm, other.frame.depth_mm)) << set;
+        EXPECT_TRUE(same_bits(base.frame.normal, other.frame.normal)) << set;
+        EXPECT_TRUE(same_bits(base.frame.uv, other.frame.uv)) << set;
+        EXPECT_TRUE(same_bits(base.frame.certified, other.frame.certified)) << set;
+    }
+}
+
+TEST(cpu_tracer, a_ray_that_passes_a_patchs_border_is_not_in_doubt)
+{
+    // Newton is drawn outwards there, and trembles along the border where it is held
+    const Traced traced = render(small_degrees().finish(), looking({5, -14, 16}, {0, 0, 0}, 52), 602, 406);
+    EXPECT_GT(hits_of(traced.frame), 24000u);
+    EXPECT_LE(traced.stats.work.uncertified_pixels, 60u) << "of " << traced.frame.face.size();
+}
+
 TEST(cpu_tracer, depth_uv_and_normal_belong_to_the_surface)
 {
     const auto scene = all_kinds().finish();

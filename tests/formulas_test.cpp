@@ -1,4 +1,5 @@
 // The shared formulas, in lanes, against long double.
+#include "runtime/cpu_evaluate.h"
 #include "shaders/shared/language.h"
 #include "shaders/shared/precision.h"
 #include "shaders/shared/quadric.h"
@@ -8,7 +9,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <random>
+#include <utility>
 #include <vector>
 
 HWY_BEFORE_NAMESPACE();
@@ -198,6 +201,48 @@ TEST(formulas, torus_roots_are_all_found_in_order)
     EXPECT_GT(found_four, 20u);
     EXPECT_LE(missed, asked / 100);
     EXPECT_LT(worst, 4e-6);
+}
+
+TEST(formulas, patches_of_small_degree_give_the_bits_of_the_general_formula)
+{
+    std::mt19937 random(11);
+    std::uniform_real_distribution<float> unit(-1, 1), weight(0.2f, 1);
+    int fixed = 0;
+    for (uint degree_u = 1; degree_u <= 4; ++degree_u) {
+        for (uint degree_v = 1; degree_v <= 4; ++degree_v) {
+            for (const bool rational : {false, true}) {
+                const Evaluate general = rational ? &evaluate_any<true> : &evaluate_any<false>;
+                const Evaluate found =
+                    find_evaluate(kKindBezier | degree_u << 8 | degree_v << 16 | (rational ? kShapeRational : 0u));
+                fixed += found != general;
+                std::vector<float> points(3); // the net begins somewhere
+                for (uint i = 0; i < (degree_u + 1) * (degree_v + 1); ++i) {
+                    const float w = rational ? weight(random) : 1;
+                    for (int c = 0; c < 3; ++c)
+                        points.push_back(w * unit(random));
+                    if (rational)
+                        points.push_back(w);
+                }
+                const FetchSource source{points.data(), nullptr, nullptr, nullptr, nullptr};
+                for (int n = 0; n < 200; ++n) {
+                    Lanes u, v;
+                    for (int i = 0; i < kLanes; ++i) {
+                        u.at[i] = 0.5f + 0.501f * unit(random);
+                        v.at[i] = 0.5f + 0.501f * unit(random);
+                    }
+                    const real2 uv(load(u.at), load(v.at));
+                    const SurfacePoint a = general(source, 3, int(degree_u), int(degree_v), uv);
+                    const SurfacePoint b = found(source, 3, int(degree_u), int(degree_v), uv);
+                    for (const auto& [of_a, of_b] : {std::pair{a.p, b.p}, {a.du, b.du}, {a.dv, b.dv}}) {
+                        const Lanes all_a[3] = {values(of_a.x), values(of_a.y), values(of_a.z)};
+                        const Lanes all_b[3] = {values(of_b.x), values(of_b.y), values(of_b.z)};
+                        ASSERT_EQ(std::memcmp(all_a, all_b, sizeof all_a), 0) << degree_u << "x" << degree_v;
+                    }
+                }
+            }
+        }
+    }
+    EXPECT_EQ(fixed, 12);
 }
 
 TEST(formulas, pairs_of_floats_keep_46_bits)
