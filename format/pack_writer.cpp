@@ -96,8 +96,7 @@ std::optional<ColumnFilter> choose_filter(ByteSpan decoded, uint32_t stride)
     const ByteSpan records = decoded.first(n * stride);
     Bytes columns(records.size());
     filter_columns(records, stride, filter, columns);
-    const int level = level_for(decoded.size(), kTrialLevel);
-    if (compress_frame(records, level).size() <= compress_frame(columns, level).size())
+    if (compress_frame(records, kTrialLevel).size() <= compress_frame(columns, kTrialLevel).size())
         return std::nullopt;
     return filter;
 }
