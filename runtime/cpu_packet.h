@@ -132,6 +132,9 @@ private:
         return hit;
     }
 
+    /// Work is counted a ray, not a packet: what Vulkan's invocations count.
+    HWY_ATTR static uint64_t lane_count(mask lanes) { return uint64_t(__builtin_popcount(lane_bits(lanes))); }
+
     /// Tests one candidate; true if a ray's nearest hit changed.
     HWY_ATTR bool intersect(const Packet& packet, uint32_t candidate_index, PacketHit& hit)
     {
@@ -140,7 +143,7 @@ private:
         const PatchRecord& patch = image_.patches[patch_id];
         if (job_.scene.shared_patch[patch_id] && was_tested(candidate.instance, patch_id))
             return false;
-        ++work_.leaf_visits;
+        work_.leaf_visits += lane_count(packet.alive);
         if (!scratch_.has_view[candidate_index]) {
             scratch_.patch_views[candidate_index] =
                 make_patch_view(patch, job_.view.instances[candidate.instance], job_.view.tau_ref);
@@ -281,7 +284,7 @@ private:
         for (int step = 0; step < kNewtonSteps && any_lane(moving); ++step) {
             const SurfacePoint s = evaluate(newton, uv);
             const NewtonStep next = newton_step(s, planes, uv);
-            ++work_.newton_steps;
+            work_.newton_steps += lane_count(moving);
             // near a double root the steps only halve the residual, so there it must be small before the last one
             const mask close = next.residual <= select(next.grazing, real(kSmallResidual), real(newton.enough));
             within_pixel = select(moving, next.residual <= newton.enough, within_pixel);
@@ -377,7 +380,7 @@ private:
             at = select(open, at, integer(face.first_entry));
             const integer entry = fetch_entry_word(FETCH_PASS at);
             const mask crossed = entry_crossed(FETCH_PASS trim, entry, fetch_entry_eta(FETCH_PASS at), q);
-            ++work_.curve_tests;
+            work_.curve_tests += lane_count(open);
             inside = differ(inside, open && crossed);
             open = open && !entry_is_last(entry);
             at = at + integer(1u);

@@ -48,7 +48,8 @@ struct Frame {
     std::vector<uint8_t> certified;
 };
 
-/// Work done per frame, all rays together. Counts do not wobble: compare them before times.
+/// Work done per frame, all rays together: a leaf visited by a packet of 16 rays counts 16 times. Counts do not wobble:
+/// compare them before times.
 struct WorkCounts {
     uint64_t rays = 0, node_visits = 0, leaf_visits = 0, newton_steps = 0, curve_tests = 0, uncertified_pixels = 0;
 };
