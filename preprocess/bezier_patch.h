@@ -25,6 +25,7 @@ struct BezierPatch {
 std::vector<BezierPatch> decompose(const CadSurface& surface, const Rect2d& domain);
 
 /// Point and first derivatives, in mm, at uv_file; for every kind. The slow, obvious form, for metrics and tests.
+/// Beyond a spline's ends: as at its end (held_to_surface).
 struct SurfaceDerivatives {
     Vec3d p, du, dv;
 };

@@ -29,6 +29,14 @@ int find_span(std::span<const double> knots, int degree, double t)
     return k;
 }
 
+double held_to_surface(std::span<const double> knots, int degree, double t)
+{
+    const double first = knots[degree], last = knots[knots.size() - degree - 1];
+    const int first_span = find_span(knots, degree, first), last_span = find_span(knots, degree, last);
+    return std::clamp(t, first - kContinuedShareOfSpan * (knots[first_span + 1] - knots[first_span]),
+                      last + kContinuedShareOfSpan * (knots[last_span + 1] - knots[last_span]));
+}
+
 void basis_functions(std::span<const double> knots, int degree, int k, double t, double* values, double* derivatives)
 {
     double left[kMaxDegree + 1], right[kMaxDegree + 1];

@@ -24,6 +24,10 @@ void basis_functions(std::span<const double> knots, int degree, int k, double t,
 /// Domain: knots[k] < knots[k + 1], a < b, a < knots[k + 1].
 void bezier_operator(std::span<const double> knots, int degree, int k, double a, double b, double* operator_out);
 
+/// Returns t, held to where the surface may be continued: a hundredth of its end spans beyond their ends. Farther out
+/// the end spans' polynomials soon mean nothing. Domain: any finite t; not for periodic directions.
+double held_to_surface(std::span<const double> knots, int degree, double t);
+
 /// The part [a, b] of span k that a domain sees; `shift` (whole periods) takes it into the domain.
 struct SpanCut {
     int k = 0;

@@ -23,6 +23,8 @@ Basis basis_at(const std::vector<double>& knots, int degree, double period, doub
     if (period > 0) {
         const double start = knots[degree];
         t -= period * std::floor((t - start) / period);
+    } else {
+        t = held_to_surface(knots, degree, t);
     }
     Basis b;
     const int k = find_span(knots, degree, t);

@@ -91,6 +91,15 @@ TEST(bezier_operator, leaves_the_curve_unchanged)
     }
 }
 
+TEST(held_to_surface, follows_a_small_overshoot_and_stops_a_large_one)
+{
+    const std::vector<double> knots{0, 0, 0, 0, 0.9999, 1, 1, 1, 1}; // an end span of 1e-4
+    EXPECT_EQ(held_to_surface(knots, 3, 0.5), 0.5);
+    EXPECT_EQ(held_to_surface(knots, 3, 1 + 5e-7), 1 + 5e-7);
+    EXPECT_NEAR(held_to_surface(knots, 3, 1.03), 1 + 1e-6, 1e-12);
+    EXPECT_NEAR(held_to_surface(knots, 3, -5), -0.009999, 1e-12);
+}
+
 TEST(bezier_operator, continues_the_polynomial_outside_its_span)
 {
     // a single span: the operator for [a, b] beyond it must give the Taylor values of t^3
