@@ -69,7 +69,7 @@ inline void expect_small(const Disagreement& d, int pixels)
     EXPECT_LE(d.normal, 1e-4);
     EXPECT_LE(d.rgba, 1e-3);
     // iterates without a root to go to wander; whether they end stuck or in doubt hangs on rounding
-    EXPECT_LE(d.certified, pixels / 500);
+    EXPECT_LE(d.certified, pixels / 1000);
 }
 
 } // namespace trimray
