@@ -103,9 +103,17 @@ TRIMRAY_CONST uint kMaxBvhDepth = 48u; // nodes on a path from root to leaf; a r
 // ---- trims ---------------------------------------------------------------------------------------------------------
 // Loops are chains of control points in uv_face. A piece is monotone in u and in v: a line (2 points) or a polynomial
 // cubic Bezier (4 points); consecutive pieces of a loop share their end point, bit for bit. Fill rule: even-odd.
-// TrimPiece word = first point (relative to the face's first_point) << 2 | kPieceCubic.
+// TrimPiece word = first point (relative to the face's first_point) << 4 | edge class << 2 | kPieceCubic.
 TRIMRAY_CONST uint kPieceCubic = 1u;
 TRIMRAY_CONST uint kEntryLast = 2u; // in a CellEntry's word: last of its cell
+TRIMRAY_CONST uint kPieceClassShift = 2u;
+TRIMRAY_CONST uint kPiecePointShift = 4u;
+// What runs along a piece, so that a picture's edges can be chosen
+TRIMRAY_CONST uint kEdgeSharp = 0u;  // two faces meet at an angle
+TRIMRAY_CONST uint kEdgeSmooth = 1u; // two faces meet with one tangent plane
+TRIMRAY_CONST uint kEdgeSeam = 2u;   // no edge: a closed surface's seam, a pole, a line that closes a gap
+TRIMRAY_CONST uint kEdgeFree = 3u;   // one face ends
+TRIMRAY_CONST uint kEdgeClassCount = 4u;
 
 // The largest float below 1. A query is clamped to [0, kUvBelowOne] in u and v: the rules below are half-open, so only
 // there do the domain's upper borders belong to the face as the lower ones do.
@@ -160,7 +168,7 @@ struct FaceRecord {
     float extent_mm[2]; // mean length of the domain along u and v on the surface
     uint surface_kind;  // kKind of the file's surface (kKindBezier for all splines, sweeps and offsets)
     uint loop_count;
-    uint reserved;
+    uint border_classes; // natural border: edge class of the sides u = 0, u = 1, v = 0, v = 1, 2 bits each; else 0
 #ifdef __cplusplus
     double domain_lo[2]; // uv_file of uv_face (0,0) and (1,1)
     double domain_hi[2];

@@ -274,7 +274,8 @@ private:
     {
         constexpr uint kKnownFlags =
             kFaceReversed | kFaceNaturalBorder | kFaceHasColor | kFaceApproximated | kFaceOpenLoop;
-        if (f.surface_kind >= kSurfaceKindCount || (f.flags & ~kKnownFlags) != 0 || f.reserved != 0)
+        if (f.surface_kind >= kSurfaceKindCount || (f.flags & ~kKnownFlags) != 0 ||
+            f.border_classes > ((f.flags & kFaceNaturalBorder) != 0 ? 0xffu : 0u))
             report_.add(3211, "FACE", fmt::format("face {}: kind {}, flags {:#x}", i, f.surface_kind, f.flags));
         const float numbers[] = {f.sdf_texel_mm, f.sdf_band_texels, f.area_mm2,    f.tolerance_mm,
                                  f.deviation_mm, f.extent_mm[0],    f.extent_mm[1]};
@@ -375,7 +376,7 @@ private:
 
     void check_piece(const FaceRecord& f, uint word, uint allowed_flags, const char* section, size_t i)
     {
-        const uint64_t first = word >> 2;
+        const uint64_t first = word >> kPiecePointShift;
         const uint64_t last = first + ((word & kPieceCubic) != 0 ? 3 : 1);
         if ((word & 3u & ~(kPieceCubic | allowed_flags)) != 0 || last >= f.point_count) {
             report_.add(3221, section, fmt::format("face {}: piece {:#x} of {} points", i, word, f.point_count));

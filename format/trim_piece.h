@@ -25,7 +25,7 @@ struct MonotonePiece {
 /// The piece that `word` of `face` stands for. Domain: a validated image.
 inline MonotonePiece load_piece(const float* points, uint first_point, uint word)
 {
-    const float* p = points + 2 * (static_cast<size_t>(first_point) + (word >> 2));
+    const float* p = points + 2 * (static_cast<size_t>(first_point) + (word >> kPiecePointShift));
     MonotonePiece piece;
     piece.cubic = (word & kPieceCubic) != 0;
     if (piece.cubic) {

@@ -51,7 +51,7 @@ double estimate_inside_fraction(const TrimLoops& trims)
         }
     };
     for (const uint32_t word : trims.pieces) {
-        const float* p = &trims.points[2 * (word >> 2)];
+        const float* p = &trims.points[2 * (word >> kPiecePointShift)];
         if ((word & kPieceCubic) == 0) {
             add_segment(p[0], p[1], p[2], p[3]);
             continue;

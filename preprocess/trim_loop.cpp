@@ -115,7 +115,7 @@ bool append_loop(const Pieces& pieces, TrimLoops& loops)
     uint32_t count = 1;
     for (CurvePiece& piece : kept) {
         order_points(piece);
-        loops.pieces.push_back((base + count - 1) << 2 | (piece.cubic ? kPieceCubic : 0));
+        loops.pieces.push_back((base + count - 1) << kPiecePointShift | (piece.cubic ? kPieceCubic : 0));
         for (int i = piece.cubic ? 1 : 3; i < 4; ++i, ++count)
             loops.points.insert(loops.points.end(),
                                 {static_cast<float>(piece.p[i].x), static_cast<float>(piece.p[i].y)});

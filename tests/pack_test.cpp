@@ -348,9 +348,9 @@ std::vector<HostileEdit> hostile_edits()
         {3219, "weight", [](M& m) { m.control_points[7] = 0; }},
         {3220, "trim point", [](M& m) { m.trim_points[2] = 1.5f; }},
         {3220, "trim control point", [](M& m) { m.trim_points[4] = kNan; }},
-        {3221, "piece", [](M& m) { m.trim_pieces[0] = 5u << 2; }},
+        {3221, "piece", [](M& m) { m.trim_pieces[0] = 5u << kPiecePointShift; }},
         {3221, "point range", [](M& m) { m.faces[2].point_count = 0xffffffffu; }},
-        {3221, "entry word", [](M& m) { m.cell_entries[0].word = 3u << 2 | kPieceCubic; }},
+        {3221, "entry word", [](M& m) { m.cell_entries[0].word = 3u << kPiecePointShift | kPieceCubic; }},
         {3222, "grid", [](M& m) { m.faces[2].grid = 0xffffffffu; }},
         {3222, "entries", [](M& m) { m.faces[2].entry_count = 3; }},
         {3223, "no end", [](M& m) { m.cell_entries[1].word &= ~kEntryLast; }},
@@ -422,7 +422,7 @@ uint64_t walk(const PackImage& m)
             const uint word = m.cells.at(f.first_cell + c);
             for (uint e = word >> 2; (word & 3) >= kCellMixedCornerOut; ++e) {
                 const CellEntry& entry = m.cell_entries.at(f.first_entry + e);
-                const uint last = (entry.word >> 2) + ((entry.word & kPieceCubic) != 0 ? 3 : 1);
+                const uint last = (entry.word >> kPiecePointShift) + ((entry.word & kPieceCubic) != 0 ? 3 : 1);
                 sum += m.trim_points.at(2 * (f.first_point + last) + 1) > 0;
                 if ((entry.word & kEntryLast) != 0)
                     break;

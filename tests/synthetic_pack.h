@@ -74,7 +74,7 @@ inline void add_synthetic_trims(PackImage& image, FaceRecord& f)
     const float points[] = {0, 0, 1, 0, 1, 0.5f, 0.5f, 1, 0, 1, 0, 0};
     image.trim_points.insert(image.trim_points.end(), std::begin(points), std::end(points));
     f.point_count = 6;
-    const uint pieces[] = {0u << 2, 1u << 2 | kPieceCubic, 4u << 2};
+    const uint pieces[] = {0u << kPiecePointShift, 1u << kPiecePointShift | kPieceCubic, 4u << kPiecePointShift};
     image.trim_pieces.insert(image.trim_pieces.end(), std::begin(pieces), std::end(pieces));
     f.piece_count = 3;
     f.grid = 2u | 1u << 16;
@@ -82,8 +82,8 @@ inline void add_synthetic_trims(PackImage& image, FaceRecord& f)
     f.first_entry = static_cast<uint>(image.cell_entries.size());
     image.cells.push_back(kCellIn);
     image.cells.push_back(kCellMixedCornerIn | 0u << 2);
-    image.cell_entries.push_back({1u << 2 | kPieceCubic, 0.25f});
-    image.cell_entries.push_back({4u << 2 | kEntryLast, kNoEta});
+    image.cell_entries.push_back({1u << kPiecePointShift | kPieceCubic, 0.25f});
+    image.cell_entries.push_back({4u << kPiecePointShift | kEntryLast, kNoEta});
     f.entry_count = 2;
     f.sdf_size = 5u | 2u << 16;
     f.sdf_first_word = static_cast<uint>(image.sdf_words.size());

@@ -102,14 +102,14 @@ void expect_sound(const TrimLoops& loops)
     uint32_t loop_start = 0, next = 0;
     uint32_t closed = 0;
     for (size_t i = 0; i < loops.pieces.size(); ++i) {
-        const uint32_t first = loops.pieces[i] >> 2;
+        const uint32_t first = loops.pieces[i] >> kPiecePointShift;
         if (i == 0 || first != next) {
             EXPECT_EQ(first, i == 0 ? 0 : next + 1);
             loop_start = first;
         }
         next = first + ((loops.pieces[i] & kPieceCubic) != 0 ? 3 : 1);
         ASSERT_LT(next, count);
-        const bool last = i + 1 == loops.pieces.size() || (loops.pieces[i + 1] >> 2) != next;
+        const bool last = i + 1 == loops.pieces.size() || (loops.pieces[i + 1] >> kPiecePointShift) != next;
         if (last) {
             EXPECT_EQ(loops.points[2 * next], loops.points[2 * loop_start]);
             EXPECT_EQ(loops.points[2 * next + 1], loops.points[2 * loop_start + 1]);

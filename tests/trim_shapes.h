@@ -138,7 +138,7 @@ inline void add_face(PackImage& image, const std::vector<Loop>& loops, float ext
         for (const Uv& p : loop.points)
             image.trim_points.insert(image.trim_points.end(), {p.u, p.v});
         for (const bool cubic : loop.cubic) {
-            image.trim_pieces.push_back(at << 2 | (cubic ? kPieceCubic : 0));
+            image.trim_pieces.push_back(at << kPiecePointShift | (cubic ? kPieceCubic : 0));
             at += cubic ? 3 : 1;
         }
     }

@@ -97,7 +97,7 @@ FN_LARGE mask left_of_cubic(real u0, real u1, real u2, real u3, real v0, real v1
 // Does the path from uv to the cell's reference corner cross the piece of this entry an odd number of times?
 FN_LARGE mask entry_crossed(FETCH_PARAM TrimFace face, integer word, real eta, real2 uv)
 {
-    integer first = integer(face.first_point) + (word >> integer(2u));
+    integer first = integer(face.first_point) + (word >> integer(kPiecePointShift));
     mask cubic = (word & integer(kPieceCubic)) != integer(0u);
     integer last = first + select(cubic, integer(3u), integer(1u));
     real2 p0 = fetch_trim_point(FETCH_PASS first);
