@@ -4,6 +4,7 @@
 #include "runtime/commands.h"
 #include "runtime/effect_plan.h"
 #include "runtime/image_io.h"
+#include "runtime/trim_mode.h"
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -137,7 +138,7 @@ int run_render(const RenderArguments& arguments)
     if (!scene.ok())
         return report_error(scene.error());
     const PackImage& image = (*scene)->pack.image;
-    if (const Status held = check_trim(image, trim_mode(arguments.trim)); !held.ok())
+    if (const auto held = choose_trim(image, trim_mode(arguments.trim)); !held.ok())
         return report_error(held.error());
     const Result<Camera> camera = camera_of(arguments.view, image, size->width, size->height);
     if (!camera.ok())
@@ -188,7 +189,7 @@ void register_render(CLI::App& app, int& exit_code)
     command->add_option("--fov", a->view.fov_deg, "Vertical field of view in degrees")->capture_default_str();
     command->add_option("--device", a->device, "auto (a hardware GPU, else the CPU), cpu or vulkan")
         ->capture_default_str();
-    command->add_option("--trim", a->trim, "auto, exact, hybrid, sdf or kd")->capture_default_str();
+    command->add_option("--trim", a->trim, "auto (exact), exact, hybrid, sdf or kd")->capture_default_str();
     command->add_option("--closest", a->closest, "stochastic or certified")->capture_default_str();
     command->add_option("--frames", a->frames, "Frames to trace and time; the picture is the last")
         ->capture_default_str()

@@ -7,7 +7,6 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <limits>
 
 #include <algorithm>
 #include <array>
@@ -73,38 +72,6 @@ TrimMode trim_mode(const std::string& name)
         return TrimMode::Hybrid;
     assert(name == "auto" && "checked against trim_choice()");
     return TrimMode::Auto;
-}
-
-Status check_trim(const PackImage& image, TrimMode mode)
-{
-    if (mode != TrimMode::Sdf && mode != TrimMode::Hybrid)
-        return Done{};
-    const auto bare = std::count_if(image.faces.begin(), image.faces.end(), [](const FaceRecord& face) {
-        return (face.flags & kFaceNaturalBorder) == 0 && face.sdf_size == 0;
-    });
-    if (bare == 0)
-        return Done{};
-    return Error{ErrorCode::UnsupportedPackFeature, fmt::format("--trim {}", trim_name(mode)),
-                 fmt::format("{} of the pack's {} faces have trims without a distance texture; use --trim exact, or "
-                             "pack with --trim-memory above 0",
-                             bare, image.faces.size())};
-}
-
-const char* trim_name(TrimMode mode)
-{
-    switch (mode) {
-    case TrimMode::Auto:
-        return "auto";
-    case TrimMode::Exact:
-        return "exact";
-    case TrimMode::Sdf:
-        return "sdf";
-    case TrimMode::Hybrid:
-        return "hybrid";
-    case TrimMode::Kd:
-        return "kd";
-    }
-    return "unknown";
 }
 
 Result<std::unique_ptr<Tracer>> make_tracer(const std::shared_ptr<const Scene>& scene, const std::string& device,

@@ -26,10 +26,6 @@ Status check_choice(const Choice& choice, const std::string& value);
 
 /// Domain: names of trim_choice().available.
 TrimMode trim_mode(const std::string& name);
-const char* trim_name(TrimMode mode);
-
-/// Whether the pack holds what a trim mode reads. Fails: UnsupportedPackFeature.
-Status check_trim(const PackImage& image, TrimMode mode);
 
 /// A tracer for `device`: "cpu", "vulkan" (software drivers too), or "auto": a hardware GPU where there is one, else
 /// the CPU; `note` says which and why. Fails: NoDevice, DeviceFailed, UnsupportedPackFeature.

@@ -45,7 +45,7 @@ struct BlockJob {
     const CpuScene& scene;
     const View& view;
     uint32_t width, height;
-    bool use_sdf;
+    TrimMode trim; // not auto
     bool shade;
     float error_px;
 };

@@ -12,12 +12,12 @@
 #include "runtime/cpu_evaluate.h"
 #include "runtime/cpu_fetch.h"
 #include "runtime/cpu_lanes.h"
+#include "runtime/cpu_trim.h"
 #include "runtime/cpu_write.h"
 #include "shaders/shared/leaf_box.h"
 #include "shaders/shared/patch_newton.h"
 #include "shaders/shared/quadric.h"
 #include "shaders/shared/torus.h"
-#include "shaders/shared/trim_lookup.h"
 
 #include <hwy/cache_control.h>
 
@@ -350,7 +350,7 @@ private:
         if (!any_lane(taken))
             return;
         if ((target.face.flags & kFaceNaturalBorder) == 0) {
-            taken = taken && inside_trims(target.face, uv, taken);
+            taken = taken && inside_trims(source_, job_.trim, target.face, uv, taken, work_.curve_tests);
             if (!any_lane(taken))
                 return;
         }
@@ -360,32 +360,6 @@ private:
         hit.uv_face = select(taken, uv, hit.uv_face);
         hit.normal = select(taken, normal, hit.normal);
         target.changed = true;
-    }
-
-    HWY_ATTR mask inside_trims(const FaceRecord& face, real2 uv, mask asked)
-    {
-        const FetchSource& source = source_;
-        const TrimFace trim = trim_face(face);
-        // lanes that do not ask look up a point that exists
-        const real2 q(select(asked, uv.x, real(0.0f)), select(asked, uv.y, real(0.0f)));
-        if (job_.use_sdf && face.sdf_size != 0)
-            return sdf_distance(FETCH_PASS trim, q) > 0.0f;
-        if (face.grid == 0)
-            return mask(false); // a face without cells has no inside
-        const integer word = cell_word(FETCH_PASS trim, q);
-        mask inside = cell_says_inside(word);
-        mask open = asked && cell_is_mixed(word);
-        integer at = cell_first_entry(trim, word);
-        while (any_lane(open)) {
-            at = select(open, at, integer(face.first_entry));
-            const integer entry = fetch_entry_word(FETCH_PASS at);
-            const mask crossed = entry_crossed(FETCH_PASS trim, entry, fetch_entry_eta(FETCH_PASS at), q);
-            work_.curve_tests += lane_count(open);
-            inside = differ(inside, open && crossed);
-            open = open && !entry_is_last(entry);
-            at = at + integer(1u);
-        }
-        return inside;
     }
 
     bool was_tested(uint instance, uint patch)

@@ -1,5 +1,6 @@
 #include "runtime/cpu_lanes.h"
 #include "runtime/tracer.h"
+#include "runtime/trim_mode.h"
 
 #include <algorithm>
 #include <chrono>
@@ -64,11 +65,11 @@ public:
             return Error{ErrorCode::Usage, "size",
                          fmt::format("{}x{} is not between 1x1 and {}x{} with at most 2^30 pixels", options.width,
                                      options.height, kLargestSide, kLargestSide)};
-        if (options.trim == TrimMode::Hybrid || options.trim == TrimMode::Kd)
-            return Error{ErrorCode::UnsupportedPackFeature, "trim",
-                         "the CPU tracer answers trims in the modes exact and sdf; choose one of them, or auto"};
+        const Result<TrimMode> trim = choose_trim(scene_->pack.image, options.trim);
+        if (!trim.ok())
+            return trim.error();
         stats.device = name_;
-        stats.trim = options.trim == TrimMode::Sdf ? TrimMode::Sdf : TrimMode::Exact;
+        stats.trim = *trim;
         stats.frame_ms.clear();
         Frame frame;
         resize(frame, options.width, options.height);
@@ -90,8 +91,7 @@ private:
     {
         const View view = make_view(cpu_scene_->image, camera_rays(options.camera, options.width, options.height),
                                     options.width, options.height);
-        const BlockJob job{*cpu_scene_,           view,          options.width,   options.height,
-                           trim == TrimMode::Sdf, options.shade, options.error_px};
+        const BlockJob job{*cpu_scene_, view, options.width, options.height, trim, options.shade, options.error_px};
         const uint32_t columns = (options.width + kBlockSide - 1) / kBlockSide,
                        rows = (options.height + kBlockSide - 1) / kBlockSide;
         tbb::enumerable_thread_specific<WorkCounts> counts;
@@ -145,7 +145,7 @@ RayHit trace_ray(const Scene& scene, const std::array<double, 3>& origin_mm, con
         return result;
     const auto cpu_scene = prepared(scene);
     const View view = make_single_ray_view(scene.pack.image, origin_mm, direction);
-    const BlockJob job{*cpu_scene, view, 1, 1, false, false, 0.02f};
+    const BlockJob job{*cpu_scene, view, 1, 1, TrimMode::Exact, false, 0.02f};
     Frame frame;
     resize(frame, 1, 1);
     const auto scratch = std::make_unique<BlockScratch>();

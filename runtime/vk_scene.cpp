@@ -123,13 +123,9 @@ SceneFacts scene_facts(const PackImage& image)
             facts.features |= kFeatureRational;
         facts.largest_net_floats = std::max(facts.largest_net_floats, points * (rational ? 4u : 3u));
     }
-    for (const FaceRecord& face : image.faces) {
-        if (face.flags & kFaceNaturalBorder)
-            continue;
-        facts.features |= kFeatureTrims;
-        facts.trims_have_cells = facts.trims_have_cells && face.grid != 0;
-        facts.trims_have_textures = facts.trims_have_textures && face.sdf_size != 0;
-    }
+    for (const FaceRecord& face : image.faces)
+        if ((face.flags & kFaceNaturalBorder) == 0)
+            facts.features |= kFeatureTrims;
     uint32_t part_depth = 1;
     for (const PartRecord& part : image.parts)
         part_depth =

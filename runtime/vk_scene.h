@@ -16,10 +16,8 @@ namespace trimray {
 
 /// What the pack holds, as far as the shader cares.
 struct SceneFacts {
-    uint32_t kinds = 0;    // bit kKind...
-    uint32_t features = 0; // kFeatureTrims, kFeatureRational
-    bool trims_have_cells = true;
-    bool trims_have_textures = true; // of all trimmed faces
+    uint32_t kinds = 0;              // bit kKind...
+    uint32_t features = 0;           // kFeatureTrims, kFeatureRational
     uint32_t stack_size = 0;         // waiting children at most, top tree and deepest part together
     uint32_t largest_net_floats = 0; // of a Bezier patch
 };

@@ -1,6 +1,7 @@
 // The Vulkan tracer: uploads a scene once, then traces each frame in bands of rows, one dispatch of primary.comp a
 // band, and reads the last frame's pixels back.
 #include "runtime/tracer.h"
+#include "runtime/trim_mode.h"
 #include "runtime/vk_buffer.h"
 #include "runtime/vk_device.h"
 #include "runtime/vk_pipeline.h"
@@ -60,7 +61,6 @@ public:
 private:
     using Specialisation = std::array<uint32_t, kFrameSpecs>;
 
-    Result<TrimMode> choose_trim(TrimMode wanted) const;
     Result<ComputePipeline*> pipeline(TrimMode trim, bool shade, bool count);
     Status prepare_frame(const FrameSetup& setup, uint32_t rows_per_band);
     Status clear_counts();
@@ -122,21 +122,6 @@ Status VulkanTracer::upload()
         timestamps_.device = device_.get();
     }
     return device_->validation_status();
-}
-
-// Auto is exact: of the right modes the one that needs no texture. A mode that the pack has no data for is refused.
-Result<TrimMode> VulkanTracer::choose_trim(TrimMode wanted) const
-{
-    const TrimMode mode = wanted == TrimMode::Auto ? TrimMode::Exact : wanted;
-    if (mode == TrimMode::Kd)
-        return Error{ErrorCode::UnsupportedPackFeature, "--trim kd",
-                     "the kd baseline runs on the CPU only; use --device cpu, or --trim exact"};
-    if (mode == TrimMode::Sdf && !facts_.trims_have_textures)
-        return Error{ErrorCode::UnsupportedPackFeature, "--trim sdf",
-                     "the pack has faces without a distance texture; use --trim exact, or pack with --trim-memory"};
-    if (mode != TrimMode::Sdf && !facts_.trims_have_cells)
-        return Error{ErrorCode::UnsupportedPackFeature, "--trim", "the pack has trimmed faces without cells"};
-    return mode;
 }
 
 Result<ComputePipeline*> VulkanTracer::pipeline(TrimMode trim, bool shade, bool count)
@@ -359,7 +344,7 @@ void VulkanTracer::take_pixels(const FrameView& view, Frame& frame) const
 
 Result<Frame> VulkanTracer::render(const RenderOptions& options, RenderStats& stats)
 {
-    const Result<TrimMode> trim = choose_trim(options.trim);
+    const Result<TrimMode> trim = choose_trim(scene_->pack.image, options.trim);
     if (!trim)
         return trim.error();
     const VkPhysicalDeviceLimits& limits = device_->properties().limits;

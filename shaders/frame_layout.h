@@ -83,7 +83,7 @@ TRIMRAY_CONST uint kFrameSpecs = 6u;
 
 TRIMRAY_CONST uint kTrimByCells = 0u;
 TRIMRAY_CONST uint kTrimByTexture = 1u;
-TRIMRAY_CONST uint kTrimByBoth = 2u; // the texture outside its band, the cells inside
+TRIMRAY_CONST uint kTrimByBoth = 2u; // the cell's class, the texture outside its band, the pieces inside
 
 TRIMRAY_CONST uint kFeatureTrims = 1u;    // some face has trims
 TRIMRAY_CONST uint kFeatureRational = 2u; // some Bezier patch is rational

@@ -65,18 +65,22 @@ bool inside_trims(FaceRecord face, vec2 uv)
 {
     if (!has_feature(kFeatureTrims) || (face.flags & kFaceNaturalBorder) != 0u)
         return true;
+    // a face without pieces has neither cells nor texture, and no inside
+    if ((trim_mode != kTrimByTexture && face.grid == 0u) || (trim_mode != kTrimByCells && face.sdf_size == 0u))
+        return false;
     TrimFace trim = trim_face(face);
-    if (trim_mode != kTrimByCells && trim.sdf_width > 0u) {
-        float distance_texels = sdf_distance(trim, uv);
-        if (trim_mode == kTrimByTexture || abs(distance_texels) > face.sdf_band_texels)
-            return distance_texels > 0.0f;
-    }
-    if (face.grid == 0u)
-        return false; // a face without cells has no inside
+    if (trim_mode == kTrimByTexture)
+        return sdf_distance(trim, uv) > 0.0f;
+    // the cell's class takes one fetch and decides most; the texture's four come before the pieces
     uint word = cell_word(trim, uv);
     bool inside = cell_says_inside(word);
     if (!cell_is_mixed(word))
         return inside;
+    if (trim_mode == kTrimByBoth) {
+        float distance_texels = sdf_distance(trim, uv);
+        if (abs(distance_texels) > face.sdf_band_texels)
+            return distance_texels > 0.0f;
+    }
     uint at = cell_first_entry(trim, word);
     for (;;) {
         CellEntry entry = cell_entries[at];

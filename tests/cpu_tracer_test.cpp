@@ -111,7 +111,7 @@ TEST(cpu_tracer, gives_the_same_bits_on_every_instruction_set)
     for (const char* set : {"avx512", "avx2", "sse4"}) {
         if (!make_cpu_tracer(scene, set).ok())
             continue;
-        for (const TrimMode trim : {TrimMode::Exact, TrimMode::Sdf}) {
+        for (const TrimMode trim : {TrimMode::Exact, TrimMode::Sdf, TrimMode::Hybrid}) {
             const Traced base = render(scene, kOverview, 157, 93, trim);
             const Traced other = render(scene, kOverview, 157, 93, trim, set);
             EXPECT_TRUE(same_bits(base.frame.rgba, other.frame.rgba)) << set;
@@ -273,18 +273,35 @@ TEST(cpu_tracer, the_texture_differs_from_the_cells_only_near_the_border)
     EXPECT_LT(double(differ), 0.01 * double(hits_of(exact)));
 }
 
-TEST(cpu_tracer, says_which_trim_modes_it_has)
+TEST(cpu_tracer, hybrid_trims_answer_as_exact_ones)
 {
-    auto tracer = make_cpu_tracer(all_kinds().finish());
+    const auto scene = all_kinds().finish();
+    for (const Camera& camera : {kOverview, looking({2, -6, 8}, {2, -1, 0}, 30)}) {
+        const Traced exact = render(scene, camera, 320, 240);
+        const Traced hybrid = render(scene, camera, 320, 240, TrimMode::Hybrid);
+        EXPECT_EQ(hybrid.stats.trim, TrimMode::Hybrid);
+        EXPECT_TRUE(same_bits(exact.frame.face, hybrid.frame.face));
+        EXPECT_TRUE(same_bits(exact.frame.depth_mm, hybrid.frame.depth_mm));
+        // the texture decides most of what the cells leave open
+        EXPECT_GT(hybrid.stats.work.curve_tests, 0u);
+        EXPECT_LT(hybrid.stats.work.curve_tests, exact.stats.work.curve_tests);
+    }
+}
+
+TEST(cpu_tracer, refuses_trim_modes_that_the_pack_has_no_data_for)
+{
+    TracedScene scene = all_kinds();
+    scene.with_textures = false;
+    auto tracer = make_cpu_tracer(scene.finish());
     ASSERT_TRUE(tracer.ok());
     RenderOptions options;
     RenderStats stats;
-    for (const TrimMode mode : {TrimMode::Hybrid, TrimMode::Kd}) {
+    for (const TrimMode mode : {TrimMode::Sdf, TrimMode::Hybrid, TrimMode::Kd}) {
         options.trim = mode;
         const Result<Frame> frame = (*tracer)->render(options, stats);
         ASSERT_FALSE(frame.ok());
         EXPECT_EQ(frame.error().code, ErrorCode::UnsupportedPackFeature);
-        EXPECT_NE(frame.error().detail.find("exact"), std::string::npos);
+        EXPECT_NE(frame.error().detail.find("--trim exact"), std::string::npos);
     }
 }
 
