@@ -53,6 +53,7 @@ Vec2d speed_at(const CadSurface& surface, double v)
 /// One use of an edge, as the walk goes: from start to end, in uv_file without shifts.
 struct Use {
     const CadEdgeUse* edge = nullptr;
+    int index = kNoUse; // over the face's loops in order
     bool backwards = false;
     Vec2d ends[2];
     Rect2d box; // of samples
@@ -293,14 +294,17 @@ std::vector<TrimChain> build_chains(const CadFace& face, double relative_toleran
 {
     std::vector<std::vector<Use>> loops;
     Rect2d rough = kEmptyRect;
+    int index = kNoUse;
     for (const CadLoop& loop : face.loops) {
         loops.emplace_back();
         for (const CadEdgeUse& edge : loop) {
+            ++index;
             if (!usable(edge, report.failure))
                 return {};
             if (!(edge.first < edge.last))
                 continue; // an edge without length
             Use use{&edge,
+                    index,
                     edge.reversed,
                     {curve_point(edge.pcurve, edge.first), curve_point(edge.pcurve, edge.last)},
                     kEmptyRect};
@@ -354,9 +358,11 @@ std::vector<TrimChain> build_chains(const CadFace& face, double relative_toleran
             report.largest_deviation_mm = std::max(report.largest_deviation_mm, fit.deviation);
             if (placed.use.backwards)
                 reverse_pieces(fit.pieces);
-            for (CurvePiece& piece : fit.pieces)
+            for (CurvePiece& piece : fit.pieces) {
+                piece.use = placed.use.index;
                 for (Vec2d& p : piece.p)
                     p = {p.x + placed.shift.x, p.y + placed.shift.y};
+            }
             CurvePiece filler;
             if (!chain.pieces.empty() &&
                 join(chain.pieces.back(), fit.pieces.front(), {0, 0}, face, joints, metric, report, filler))

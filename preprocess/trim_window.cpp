@@ -81,9 +81,12 @@ void cut_at(Pieces& pieces, Axis axis, double x)
     pieces = std::move(out);
 }
 
-/// Presses what lies beyond [lo, hi] against the border.
+/// Presses what lies beyond [lo, hi] against the border, where it runs along no edge; what lay there stays its edge's.
 void press_into(Pieces& pieces, Axis axis, double lo, double hi)
 {
+    const auto on_border = [&](double x) {
+        return std::min(std::abs(x - lo), std::abs(x - hi)) <= kWholePeriod * (hi - lo);
+    };
     cut_at(pieces, axis, lo);
     cut_at(pieces, axis, hi);
     for (CurvePiece& piece : pieces) {
@@ -91,9 +94,12 @@ void press_into(Pieces& pieces, Axis axis, double lo, double hi)
                              std::min(axis.along(piece.p[0]), axis.along(piece.p[3])) >= hi;
         if (!outside)
             continue;
+        const bool lay_there = on_border(axis.along(piece.p[0])) && on_border(axis.along(piece.p[3]));
+        const int use = lay_there ? piece.use : kNoUse;
         axis.along(piece.p[0]) = std::clamp(axis.along(piece.p[0]), lo, hi);
         axis.along(piece.p[3]) = std::clamp(axis.along(piece.p[3]), lo, hi);
         piece = line_piece(piece.p[0], piece.p[3]);
+        piece.use = use;
     }
 }
 
