@@ -1,10 +1,12 @@
 // The vector part of the CPU tracer: traces a block of pixels in packets of 16 rays, compiled once per instruction set.
 #pragma once
 
+#include "format/trim_reference.h"
 #include "runtime/cpu_view.h"
 #include "runtime/tracer.h"
 
 #include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -39,6 +41,7 @@ struct BlockScratch {
     std::vector<float> x0, x1, y0, y1, near_mm;
     std::vector<uint32_t> index;
     Strip strip;
+    std::vector<TrimQueries> trim_queries; // of all blocks so far, where the job records them
 };
 
 struct BlockJob {
@@ -48,6 +51,8 @@ struct BlockJob {
     TrimMode trim; // not auto
     bool shade;
     float error_px;
+    const TrimReference* reference = nullptr; // TrimMode::Reference has one
+    bool record_trim_queries = false;
 };
 
 /// Traces the block into `frame`, whose arrays have their size.
@@ -56,5 +61,11 @@ using TraceBlock = void (*)(const BlockJob& job, const Block& block, BlockScratc
 
 /// The fastest version that this machine runs, or the one named: "avx512", "avx2", "sse4". Null: unknown or not here.
 TraceBlock find_trace_block(const std::string& instruction_set, std::string& found);
+
+/// Answers queries[i] in the mode `trim` (not auto, not reference), as tracing does, into inside[i]; bits of lanes that
+/// do not ask mean nothing. Shapes: as many of one as of the other.
+using AnswerTrims = void (*)(const CpuScene& scene, TrimMode trim, std::span<const TrimQueries> queries,
+                             std::span<uint16_t> inside);
+AnswerTrims find_answer_trims(const std::string& instruction_set);
 
 } // namespace trimray

@@ -13,6 +13,7 @@
 #include "runtime/cpu_fetch.h"
 #include "runtime/cpu_lanes.h"
 #include "runtime/cpu_trim.h"
+#include "runtime/cpu_trim_reference.h"
 #include "runtime/cpu_write.h"
 #include "shaders/shared/leaf_box.h"
 #include "shaders/shared/patch_newton.h"
@@ -350,7 +351,9 @@ private:
         if (!any_lane(taken))
             return;
         if ((target.face.flags & kFaceNaturalBorder) == 0) {
-            taken = taken && inside_trims(source_, job_.trim, target.face, uv, taken, work_.curve_tests);
+            taken = taken && (job_.reference != nullptr
+                                  ? inside_by_reference(job_, target.patch.face, uv, taken, scratch_)
+                                  : inside_trims(source_, job_.trim, target.face, uv, taken, work_.curve_tests));
             if (!any_lane(taken))
                 return;
         }

@@ -71,6 +71,9 @@ public:
         stats.device = name_;
         stats.trim = *trim;
         stats.frame_ms.clear();
+        stats.trim_queries.clear();
+        if (*trim == TrimMode::Reference && reference_ == nullptr)
+            reference_ = std::make_unique<const TrimReference>(scene_->pack.image);
         Frame frame;
         resize(frame, options.width, options.height);
         const int threads =
@@ -81,6 +84,7 @@ public:
             stats.work = render_once(options, stats.trim, threads, arena, frame);
             const std::chrono::duration<double, std::milli> spent = std::chrono::steady_clock::now() - start;
             stats.frame_ms.push_back(spent.count());
+            take_queries(stats.trim_queries);
         }
         return frame;
     }
@@ -91,7 +95,11 @@ private:
     {
         const View view = make_view(cpu_scene_->image, camera_rays(options.camera, options.width, options.height),
                                     options.width, options.height);
-        const BlockJob job{*cpu_scene_, view, options.width, options.height, trim, options.shade, options.error_px};
+        BlockJob job{*cpu_scene_, view, options.width, options.height, trim, options.shade, options.error_px};
+        if (trim == TrimMode::Reference) {
+            job.reference = reference_.get();
+            job.record_trim_queries = options.record_trim_queries;
+        }
         const uint32_t columns = (options.width + kBlockSide - 1) / kBlockSide,
                        rows = (options.height + kBlockSide - 1) / kBlockSide;
         tbb::enumerable_thread_specific<WorkCounts> counts;
@@ -112,10 +120,21 @@ private:
         return sum;
     }
 
+    /// Replaces `queries` by the last frame's.
+    void take_queries(std::vector<TrimQueries>& queries)
+    {
+        queries.clear();
+        for (BlockScratch& scratch : scratch_) {
+            queries.insert(queries.end(), scratch.trim_queries.begin(), scratch.trim_queries.end());
+            scratch.trim_queries.clear();
+        }
+    }
+
     std::shared_ptr<const Scene> scene_;
     std::shared_ptr<const CpuScene> cpu_scene_;
     TraceBlock trace_block_;
     std::string name_;
+    std::unique_ptr<const TrimReference> reference_; // made when first asked for
     tbb::enumerable_thread_specific<BlockScratch> scratch_;
 };
 

@@ -24,16 +24,29 @@ struct Scene {
 
 Result<std::shared_ptr<const Scene>> load_scene(const std::string& path, bool previews_and_proxy = false);
 
-enum class TrimMode { Auto, Exact, Sdf, Hybrid, Kd };
+/// How trims are answered (DESIGN's modes). Reference counts crossings in double over all pieces of a face, on the CPU
+/// tracer only: slow, and what the others are measured against. All else is traced alike in every mode, so pictures in
+/// two modes differ by trim decisions alone.
+enum class TrimMode { Auto, Exact, Sdf, Hybrid, Kd, Reference };
+
+/// Trim queries of a packet of 16 rays against one face: those in the lanes whose bits are set in `asked`.
+struct TrimQueries {
+    alignas(64) float u[16]; // uv_face
+    alignas(64) float v[16];
+    uint32_t face;
+    uint32_t asked;
+    uint32_t inside; // the reference's answers, in the lanes asked
+};
 
 struct RenderOptions {
     uint32_t width = 1280, height = 720;
     Camera camera;
     TrimMode trim = TrimMode::Auto;
-    uint32_t threads = 0;   // 0: all cores
-    uint32_t frames = 1;    // timed frames; the picture is the last one's
-    float error_px = 0.02f; // stop of Newton's iteration, in pixels
-    bool shade = true;      // fill rgba
+    uint32_t threads = 0;             // 0: all cores
+    uint32_t frames = 1;              // timed frames; the picture is the last one's
+    float error_px = 0.02f;           // stop of Newton's iteration, in pixels
+    bool shade = true;                // fill rgba
+    bool record_trim_queries = false; // with TrimMode::Reference: fill RenderStats::trim_queries
 };
 
 /// Per-pixel results, row 0 at the top. A miss has depth +inf, face -1, zeros elsewhere.
@@ -59,6 +72,7 @@ struct RenderStats {
     std::vector<double> frame_ms; // tracing and shading, not loading or compiling
     WorkCounts work;              // of one frame
     TrimMode trim = TrimMode::Exact;
+    std::vector<TrimQueries> trim_queries; // of one frame, if asked for; on one thread in the order in which they came
 };
 
 class Tracer {

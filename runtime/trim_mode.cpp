@@ -19,6 +19,8 @@ const char* trim_name(TrimMode mode)
         return "hybrid";
     case TrimMode::Kd:
         return "kd";
+    case TrimMode::Reference:
+        return "reference";
     }
     return "unknown";
 }
@@ -26,6 +28,8 @@ const char* trim_name(TrimMode mode)
 Result<TrimMode> choose_trim(const PackImage& image, TrimMode wanted)
 {
     const TrimMode mode = wanted == TrimMode::Auto ? TrimMode::Exact : wanted;
+    if (mode == TrimMode::Reference)
+        return mode;
     const auto refusal = [mode](const std::string& detail) {
         return Error{ErrorCode::UnsupportedPackFeature, fmt::format("--trim {}", trim_name(mode)), detail};
     };

@@ -347,6 +347,8 @@ Result<Frame> VulkanTracer::render(const RenderOptions& options, RenderStats& st
     const Result<TrimMode> trim = choose_trim(scene_->pack.image, options.trim);
     if (!trim)
         return trim.error();
+    if (*trim == TrimMode::Reference)
+        return Error{ErrorCode::UnsupportedPackFeature, "--trim reference", "is the CPU tracer's; use --device cpu"};
     const VkPhysicalDeviceLimits& limits = device_->properties().limits;
     const size_t row_bytes = size_t{options.width} * sizeof(FramePixel);
     const size_t band_bytes = std::min<size_t>(kBandBytes, limits.maxStorageBufferRange);

@@ -238,7 +238,7 @@ TEST_F(vk_tracer, refuses_what_the_pack_has_no_data_for)
     ASSERT_TRUE(tracer);
     RenderOptions options = small_picture({20, -40, 25});
     RenderStats stats;
-    for (const TrimMode mode : {TrimMode::Sdf, TrimMode::Hybrid, TrimMode::Kd}) {
+    for (const TrimMode mode : {TrimMode::Sdf, TrimMode::Hybrid, TrimMode::Kd, TrimMode::Reference}) {
         options.trim = mode;
         const Result<Frame> frame = tracer->render(options, stats);
         ASSERT_FALSE(frame.ok());
