@@ -6,10 +6,13 @@
 #include "preprocess/cad_import.h"
 #include "preprocess/cad_model.h"
 
+#include <GeomAdaptor_Surface.hxx>
 #include <NCollection_DataMap.hxx>
 #include <Standard_Handle.hxx>
+#include <TopLoc_Location.hxx>
 #include <TopTools_IndexedMapOfShape.hxx>
 #include <TopTools_ShapeMapHasher.hxx>
+#include <TopoDS_Edge.hxx>
 #include <TopoDS_Face.hxx>
 #include <TopoDS_Shape.hxx>
 
@@ -21,7 +24,6 @@
 class Geom2d_Curve;
 class Geom_Surface;
 class TDocStd_Document;
-class TopLoc_Location;
 class XSAlgo_AlgoContainer;
 
 namespace trimray::kernel {
@@ -145,6 +147,27 @@ Result<ConvertedPcurve> convert_pcurve(const opencascade::handle<Geom2d_Curve>& 
 /// Carries a pcurve over to the converted surface's parameters: exactly where the map is affine or the pcurve runs
 /// along u or v, else within 1e-7 of an arc. Fails: InvalidTrim.
 Result<ConvertedPcurve> map_pcurve(const ConvertedPcurve& pcurve, const UvMap& map);
+
+/// Measures a face's pcurves against the curves in space of their edges. Not to be shared between threads.
+class PcurveGauge {
+public:
+    explicit PcurveGauge(const TopoDS_Face& face);
+
+    /// Largest distance of S(pcurve(t)), first <= t <= last, from the edge's curve, in mm: of samples, refined around
+    /// the worst of them. 0 where the edge has no curve (a pole).
+    double deviation_mm(const TopoDS_Edge& edge, const opencascade::handle<Geom2d_Curve>& pcurve, double first,
+                        double last) const;
+
+    /// The edge's curve projected onto the surface, over the same parameters and in the same period as `pcurve`. Null
+    /// where the kernel finds none.
+    opencascade::handle<Geom2d_Curve> projected(const TopoDS_Edge& edge,
+                                                const opencascade::handle<Geom2d_Curve>& pcurve, double first,
+                                                double last) const;
+
+private:
+    TopLoc_Location location_;
+    GeomAdaptor_Surface surface_; // without the location
+};
 
 /// The face's loops in the walk's order, in the kernel's uv. `face` must be oriented forward. Edges without a pcurve
 /// are projected onto the surface, which changes the shape, so only where `may_project`; otherwise they are an error.

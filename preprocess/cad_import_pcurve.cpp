@@ -99,7 +99,7 @@ std::vector<CadLoop> chain(std::vector<CadEdgeUse> uses)
 }
 
 Result<CadEdgeUse> edge_use(const TopoDS_Edge& edge, const TopoDS_Face& face, const TopTools_IndexedMapOfShape& edges,
-                            bool may_project)
+                            const PcurveGauge& gauge, bool may_project)
 {
     double first = 0, last = 0;
     Handle(Geom2d_Curve) curve = BRep_Tool::CurveOnSurface(edge, face, first, last);
@@ -114,6 +114,7 @@ Result<CadEdgeUse> edge_use(const TopoDS_Edge& edge, const TopoDS_Face& face, co
     if (!pcurve)
         return pcurve.error();
     CadEdgeUse use;
+    use.deviation_mm = gauge.deviation_mm(edge, curve, first, last);
     use.pcurve = pcurve->curve;
     use.first = pcurve->first;
     use.last = pcurve->last;
@@ -189,6 +190,7 @@ Result<std::vector<CadLoop>> collect_loops(const TopoDS_Face& face, const TopToo
                                            bool may_project)
 {
     std::vector<CadLoop> loops;
+    const PcurveGauge gauge(face);
     for (TopoDS_Iterator it(face, false); it.More(); it.Next()) {
         if (it.Value().ShapeType() != TopAbs_WIRE || it.Value().Orientation() == TopAbs_INTERNAL ||
             it.Value().Orientation() == TopAbs_EXTERNAL)
@@ -204,7 +206,7 @@ Result<std::vector<CadLoop>> collect_loops(const TopoDS_Face& face, const TopToo
         const bool complete = walked.size() == all.size();
         std::vector<CadEdgeUse> uses;
         for (const TopoDS_Edge& edge : complete ? walked : all) {
-            Result<CadEdgeUse> use = edge_use(edge, face, edges, may_project);
+            Result<CadEdgeUse> use = edge_use(edge, face, edges, gauge, may_project);
             if (!use)
                 return use.error();
             uses.push_back(std::move(*use));

@@ -40,6 +40,7 @@ struct CadEdgeUse {
     bool seam = false;       // the edge is used twice by this face, on a closed surface's seam
     bool degenerate = false; // a pole or apex: a line in uv that is one point in space
     uint32_t edge = 0;       // index into CadPart::edges
+    double deviation_mm = 0; // largest distance of the pcurve, on the surface, from the edge's curve in space
 };
 
 struct CadEdge {

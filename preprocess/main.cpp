@@ -7,6 +7,7 @@
 #include "preprocess/dump_trims.h"
 #include "preprocess/preview.h"
 #include "preprocess/source_file.h"
+#include "preprocess/trim_report.h"
 #include "preprocess/worker.h"
 
 #include <CLI/CLI.hpp>
@@ -179,6 +180,20 @@ Json dropped_json(const PackImage& image)
     return list;
 }
 
+Json trims_json(const DeviationReport& deviations)
+{
+    Json worst = Json::array();
+    for (const PcurveDeviation& d : deviations.worst)
+        worst.push_back({{"face", d.face_in_part},
+                         {"part", d.part},
+                         {"edge", d.edge},
+                         {"deviation_mm", d.deviation_mm},
+                         {"tolerance_mm", d.tolerance_mm}});
+    return {{"largest_pcurve_deviation_mm", deviations.largest_mm},
+            {"edge_uses_above_tolerance", deviations.above_tolerance},
+            {"edges_above_tolerance", worst}};
+}
+
 /// The whole conversion; runs in the worker. Returns the report as JSON text.
 Result<std::string> convert(const Options& options, const SourceFile& source, const WorkerProgress& progress)
 {
@@ -249,6 +264,7 @@ Result<std::string> convert(const Options& options, const SourceFile& source, co
     json["faces_instanced"] = instanced;
     json["patches"] = image.patches.size();
     json["leaves"] = image.leaves.size();
+    json["trims"] = trims_json(gather_deviations(*model));
     json["seconds"] = {
         {"read", model->read_seconds}, {"transfer", model->transfer_seconds}, {"faces", model->faces_seconds},
         {"mesh", model->mesh_seconds}, {"convert", report.convert_seconds},   {"trims", report.trims_seconds},
@@ -282,6 +298,10 @@ void print_table(const Json& report)
         fmt::format("{} parts, {} instances, {} faces placed, {} patches, {} leaves", report["parts"].get<size_t>(),
                     report["instances"].get<size_t>(), report["faces_instanced"].get<size_t>(),
                     report["patches"].get<size_t>(), report["leaves"].get<size_t>()));
+    const Json& trims = report["trims"];
+    row("trims", fmt::format("pcurves within {:.3g} mm of their edges, {} beyond an edge's tolerance",
+                             trims["largest_pcurve_deviation_mm"].get<double>(),
+                             trims["edge_uses_above_tolerance"].get<size_t>()));
     std::string times;
     for (const auto& [phase, seconds] : report["seconds"].items())
         times += fmt::format("{}{} {:.2f}", times.empty() ? "" : ", ", phase, seconds.get<double>());
