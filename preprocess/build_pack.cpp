@@ -168,6 +168,7 @@ FaceRecord face_record(const ConvertedFace& face, StringTable& strings)
     r.extent_mm[1] = rough(face.extent.length_v_mm);
     r.surface_kind = cad.surface.kind;
     r.loop_count = face.trims.loop_count;
+    r.border_classes = face.trims.border_classes;
     r.domain_lo[0] = face.trims.domain.lo.x;
     r.domain_lo[1] = face.trims.domain.lo.y;
     r.domain_hi[0] = face.trims.domain.hi.x;

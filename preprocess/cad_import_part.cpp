@@ -1,5 +1,6 @@
 // Parts: faces and edges of a shape, each face converted or dropped with a reason, and the triangles of the proxy mesh.
 #include "preprocess/cad_import_kernel.h"
+#include "preprocess/edge_class.h"
 
 #include <BRepMesh_IncrementalMesh.hxx>
 #include <BRepTools.hxx>
@@ -139,6 +140,7 @@ CadPart convert_part(const PartShape& source, uint32_t part_index, const ImportO
         out.color_rgba = colors.IsBound(face) ? std::optional(colors.Find(face)) : source.color_rgba;
         part.faces.push_back(std::move(out));
     }
+    classify_edges(part);
     return part;
 }
 

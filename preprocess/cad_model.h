@@ -37,15 +37,16 @@ struct CadEdgeUse {
     SplineCurve2d pcurve;
     double first = 0, last = 0; // within the pcurve's knots
     bool reversed = false;
-    bool seam = false;       // the edge is used twice by this face, on a closed surface's seam
-    bool degenerate = false; // a pole or apex: a line in uv that is one point in space
-    uint32_t edge = 0;       // index into CadPart::edges
-    double deviation_mm = 0; // largest distance of the pcurve, on the surface, from the edge's curve in space
+    bool seam = false;                // the edge is used twice by this face, on a closed surface's seam
+    bool degenerate = false;          // a pole or apex: a line in uv that is one point in space
+    uint32_t edge = 0;                // index into CadPart::edges
+    double deviation_mm = 0;          // largest distance of the pcurve, on the surface, from the edge's curve in space
+    uint32_t edge_class = kEdgeSharp; // classify_edges
 };
 
 struct CadEdge {
     double tolerance_mm = 0;
-    bool smooth = false; // its faces meet with continuous tangents, as the file or the kernel says
+    bool smooth = false; // its faces meet with continuous tangents, as the file or the kernel says; seldom told
 };
 
 using CadLoop = std::vector<CadEdgeUse>; // in the order of the walk; `edges` order may be incomplete in bad files

@@ -42,9 +42,27 @@ void map_to_face(Pieces& pieces, const Rect2d& domain, Vec2d snap)
     }
 }
 
-/// A closed loop of lines that follow each other straight becomes one of longer lines: a corner is left out where it
-/// lies within `tolerance` (metric) of the line that replaces its two. Returns the largest distance.
-double merge_lines(Pieces& pieces, Vec2d metric, double tolerance)
+/// Edge classes of a face's edge uses, in the order that CurvePiece::use counts in.
+class UseClasses {
+public:
+    explicit UseClasses(const CadFace& face)
+    {
+        for (const CadLoop& loop : face.loops)
+            for (const CadEdgeUse& use : loop)
+                classes_.push_back(use.edge_class);
+    }
+    uint32_t operator()(const CurvePiece& piece) const
+    {
+        return piece.use == kNoUse ? kEdgeSeam : classes_[static_cast<size_t>(piece.use)];
+    }
+
+private:
+    std::vector<uint32_t> classes_;
+};
+
+/// A closed loop of lines of one edge class that follow each other straight becomes one of longer lines: a corner is
+/// left out where it lies within `tolerance` (metric) of the line that replaces its two. Returns the largest distance.
+double merge_lines(Pieces& pieces, const UseClasses& class_of, Vec2d metric, double tolerance)
 {
     const auto distance = [&](Vec2d p, Vec2d a, Vec2d b) {
         const double x = (b.x - a.x) * metric.x, y = (b.y - a.y) * metric.y;
@@ -59,7 +77,7 @@ double merge_lines(Pieces& pieces, Vec2d metric, double tolerance)
     for (const CurvePiece& piece : pieces) {
         if (!piece.cubic && piece.p[0].x == piece.p[3].x && piece.p[0].y == piece.p[3].y)
             continue;
-        if (!out.empty() && !piece.cubic && !out.back().cubic) {
+        if (!out.empty() && !piece.cubic && !out.back().cubic && class_of(piece) == class_of(out.back())) {
             const Vec2d a = out.back().p[0], middle = piece.p[0], b = piece.p[3];
             // a line that turns back is kept, or its end would be lost
             const double ahead = (middle.x - a.x) * (b.x - middle.x) * metric.x * metric.x +
@@ -83,7 +101,7 @@ double merge_lines(Pieces& pieces, Vec2d metric, double tolerance)
 
 /// Rounds a loop and appends it; pieces that vanish are left out. The points are one chain, so ends are shared, and its
 /// last point is its first, bit for bit. False: nothing was left.
-bool append_loop(const Pieces& pieces, TrimLoops& loops)
+bool append_loop(const Pieces& pieces, const UseClasses& class_of, TrimLoops& loops)
 {
     // Multiples of 2^-22, off by 1.2e-7 of the face at most (single precision is off by half as much near 1): they
     // leave no noise in the low bits. One rounding for all points keeps shared ends shared and monotone pieces
@@ -115,7 +133,8 @@ bool append_loop(const Pieces& pieces, TrimLoops& loops)
     uint32_t count = 1;
     for (CurvePiece& piece : kept) {
         order_points(piece);
-        loops.pieces.push_back((base + count - 1) << kPiecePointShift | (piece.cubic ? kPieceCubic : 0));
+        loops.pieces.push_back((base + count - 1) << kPiecePointShift | class_of(piece) << kPieceClassShift |
+                               (piece.cubic ? kPieceCubic : 0));
         for (int i = piece.cubic ? 1 : 3; i < 4; ++i, ++count)
             loops.points.insert(loops.points.end(),
                                 {static_cast<float>(piece.p[i].x), static_cast<float>(piece.p[i].y)});
@@ -161,6 +180,42 @@ bool is_natural(const std::vector<MonotonePiece>& pieces)
     return inside_length(pieces, 0.5) == 1;
 }
 
+/// The class of each side of a natural border: of the edges along it the one with the greatest length in uv; where
+/// edges take up less than half of the side, it is no edge.
+uint32_t border_classes(const std::vector<uint32_t>& words, const std::vector<MonotonePiece>& pieces)
+{
+    double length[4][kEdgeClassCount] = {}; // sides u = 0, u = 1, v = 0, v = 1
+    for (size_t i = 0; i < pieces.size(); ++i) {
+        const MonotonePiece& p = pieces[i];
+        const bool on_u = p.u[0] == p.u[3] && (p.u[0] == 0 || p.u[0] == 1);
+        const int side = on_u ? (p.u[0] == 0 ? 0 : 1) : (p.v[0] == 0 ? 2 : 3);
+        const uint32_t edge_class = words[i] >> kPieceClassShift & (kEdgeClassCount - 1);
+        length[side][edge_class] += on_u ? p.v_hi() - p.v_lo() : p.u_hi() - p.u_lo();
+    }
+    uint32_t classes = 0;
+    for (int side = 0; side < 4; ++side) {
+        uint32_t longest = kEdgeSeam;
+        double edges = 0, most = 0;
+        for (const uint32_t edge_class : {kEdgeSharp, kEdgeFree, kEdgeSmooth}) {
+            edges += length[side][edge_class];
+            if (length[side][edge_class] > most) {
+                most = length[side][edge_class];
+                longest = edge_class;
+            }
+        }
+        classes |= (edges >= 0.5 ? longest : kEdgeSeam) << (2 * side);
+    }
+    return classes;
+}
+
+/// The same where a face has no edges: its surface closes on itself, ends in poles, or just ends.
+uint32_t natural_bounds_classes(const CadSurface& surface)
+{
+    const uint32_t u = surface.period_u > 0 ? kEdgeSeam : kEdgeFree;
+    const uint32_t v = surface.period_v > 0 || surface.kind == kKindSphere ? kEdgeSeam : kEdgeFree;
+    return u | u << 2 | v << 4 | v << 6;
+}
+
 } // namespace
 
 Result<TrimLoops> build_trim_loops(const CadFace& face, const TrimOptions& options)
@@ -173,6 +228,7 @@ Result<TrimLoops> build_trim_loops(const CadFace& face, const TrimOptions& optio
             return invalid(face, "no loops, and the surface has no natural bounds");
         loops.domain = face.surface.natural_bounds;
         loops.natural_border = true;
+        loops.border_classes = natural_bounds_classes(face.surface);
         return loops;
     }
 
@@ -195,11 +251,12 @@ Result<TrimLoops> build_trim_loops(const CadFace& face, const TrimOptions& optio
     const Vec2d mm_per_face{metric.mm_per_uv.x * size.x, metric.mm_per_uv.y * size.y};
     const Vec2d snap{std::min(metric.tolerance_mm / mm_per_face.x, 1e-4),
                      std::min(metric.tolerance_mm / mm_per_face.y, 1e-4)};
+    const UseClasses class_of(face);
     double merged_mm = 0;
     for (TrimChain& chain : chains) {
         map_to_face(chain.pieces, loops.domain, snap);
-        merged_mm = std::max(merged_mm, merge_lines(chain.pieces, mm_per_face, 0.1 * metric.tolerance_mm));
-        append_loop(chain.pieces, loops);
+        merged_mm = std::max(merged_mm, merge_lines(chain.pieces, class_of, mm_per_face, 0.1 * metric.tolerance_mm));
+        append_loop(chain.pieces, class_of, loops);
     }
     std::vector<MonotonePiece> pieces;
     for (const uint32_t word : loops.pieces)
@@ -213,6 +270,7 @@ Result<TrimLoops> build_trim_loops(const CadFace& face, const TrimOptions& optio
         (report.largest_deviation_mm + report.largest_move_mm + merged_mm) / metric.longer_side_mm;
     if (is_natural(pieces)) {
         loops.natural_border = true;
+        loops.border_classes = border_classes(loops.pieces, pieces);
         loops.points.clear();
         loops.pieces.clear();
         loops.loop_count = 0;

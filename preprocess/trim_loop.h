@@ -19,6 +19,7 @@ struct TrimOptions {
 struct TrimLoops {
     Rect2d domain;                // uv_file; the loops' bounding rectangle after unwrapping periods
     bool natural_border = false;  // the loops run along the domain's rectangle and nothing else
+    uint32_t border_classes = 0;  // of a natural border, as in FaceRecord
     std::vector<float> points;    // u, v pairs in uv_face; chains of loops
     std::vector<uint32_t> pieces; // pack_layout.h TrimPiece words
     uint32_t loop_count = 0;

@@ -2,10 +2,17 @@
 
 #include <BRepAlgoAPI_Cut.hxx>
 #include <BRepBndLib.hxx>
+#include <BRepBuilderAPI_MakeEdge.hxx>
 #include <BRepBuilderAPI_MakeFace.hxx>
+#include <BRepBuilderAPI_MakeVertex.hxx>
+#include <BRepBuilderAPI_MakeWire.hxx>
 #include <BRepBuilderAPI_Transform.hxx>
+#include <BRepFilletAPI_MakeFillet.hxx>
+#include <BRepPrimAPI_MakeBox.hxx>
 #include <BRepPrimAPI_MakeCone.hxx>
 #include <BRepPrimAPI_MakeCylinder.hxx>
+#include <BRepPrimAPI_MakePrism.hxx>
+#include <BRepPrimAPI_MakeSphere.hxx>
 #include <BRepTools.hxx>
 #include <BRep_Builder.hxx>
 #include <Bnd_Box.hxx>
@@ -13,6 +20,7 @@
 #include <GeomAPI_PointsToBSplineSurface.hxx>
 #include <Geom_BSplineCurve.hxx>
 #include <Geom_BSplineSurface.hxx>
+#include <Geom_BezierCurve.hxx>
 #include <Geom_OffsetSurface.hxx>
 #include <Geom_RectangularTrimmedSurface.hxx>
 #include <Geom_SurfaceOfLinearExtrusion.hxx>
@@ -21,10 +29,13 @@
 #include <Standard_Failure.hxx>
 #include <TColgp_Array1OfPnt.hxx>
 #include <TColgp_Array2OfPnt.hxx>
+#include <TopExp_Explorer.hxx>
 #include <TopLoc_Location.hxx>
+#include <TopoDS.hxx>
 #include <TopoDS_Compound.hxx>
 #include <gp_Ax1.hxx>
 #include <gp_Ax2.hxx>
+#include <gp_Circ.hxx>
 #include <gp_Pln.hxx>
 #include <gp_Trsf.hxx>
 
@@ -63,6 +74,60 @@ TopoDS_Shape read_step(const std::string& path)
         return {};
     reader.TransferRoots();
     return reader.OneShape();
+}
+
+TopoDS_Shape rounded_box()
+{
+    const TopoDS_Shape box = BRepPrimAPI_MakeBox(10, 8, 6).Shape();
+    BRepFilletAPI_MakeFillet round(box);
+    for (TopExp_Explorer edge(box, TopAbs_EDGE); edge.More(); edge.Next())
+        round.Add(1.5, TopoDS::Edge(edge.Current()));
+    return round.Shape();
+}
+
+/// A tube 10 mm high over the closed curve of these edges.
+TopoDS_Shape tube_over(const TopoDS_Shape& curve)
+{
+    return BRepPrimAPI_MakePrism(curve, gp_Vec(0, 0, 10)).Shape();
+}
+
+/// A closed curve with one corner, at its ends.
+TopoDS_Shape drop_curve()
+{
+    TColgp_Array1OfPnt points(1, 4);
+    points(1) = points(4) = gp_Pnt(0, 0, 0);
+    points(2) = gp_Pnt(12, 8, 0);
+    points(3) = gp_Pnt(12, -8, 0);
+    return BRepBuilderAPI_MakeEdge(Handle(Geom_Curve)(new Geom_BezierCurve(points))).Shape();
+}
+
+TopoDS_Shape half_tubes()
+{
+    const gp_Circ circle(gp_Ax2(gp_Pnt(0, 0, 0), gp_Dir(0, 0, 1)), 5);
+    const TopoDS_Vertex a = BRepBuilderAPI_MakeVertex(gp_Pnt(5, 0, 0)), b = BRepBuilderAPI_MakeVertex(gp_Pnt(-5, 0, 0));
+    return tube_over(
+        BRepBuilderAPI_MakeWire(BRepBuilderAPI_MakeEdge(circle, a, b), BRepBuilderAPI_MakeEdge(circle, b, a)).Shape());
+}
+
+TopoDS_Shape three_sheets()
+{
+    BRep_Builder builder;
+    TopoDS_Compound spokes;
+    builder.MakeCompound(spokes);
+    const TopoDS_Vertex hub = BRepBuilderAPI_MakeVertex(gp_Pnt(0, 0, 0));
+    for (const gp_Pnt& tip : {gp_Pnt(10, 0, 0), gp_Pnt(-5, 8, 0), gp_Pnt(-5, -8, 0)})
+        builder.Add(spokes, BRepBuilderAPI_MakeEdge(hub, BRepBuilderAPI_MakeVertex(tip)).Shape());
+    return tube_over(spokes);
+}
+
+TopoDS_Shape touching_boxes()
+{
+    BRep_Builder builder;
+    TopoDS_Compound boxes;
+    builder.MakeCompound(boxes);
+    builder.Add(boxes, BRepPrimAPI_MakeBox(gp_Pnt(0, 0, 0), gp_Pnt(10, 10, 10)).Shape());
+    builder.Add(boxes, BRepPrimAPI_MakeBox(gp_Pnt(10, 0, 0), gp_Pnt(20, 10, 10)).Shape());
+    return boxes;
 }
 
 gp_Trsf mirrored_in_x()
@@ -161,6 +226,36 @@ bool write_unbounded_plane(const std::string& path)
         builder.Add(all, BRepBuilderAPI_MakeFace(gp_Pln(gp_Pnt(0, 0, 0), gp_Dir(0, 0, 1)), 0, 1, 0, 1).Shape());
         builder.Add(all, BRepBuilderAPI_MakeFace(gp_Pln(gp_Pnt(0, 0, 5), gp_Dir(0, 0, 1))).Shape());
         return write_shape(all, path);
+    } catch (const Standard_Failure&) {
+        return false;
+    }
+}
+
+bool write_solid(const std::string& name, const std::string& path)
+{
+    const gp_Circ circle(gp_Ax2(gp_Pnt(0, 0, 0), gp_Dir(0, 0, 1)), 5);
+    try {
+        if (name == "box")
+            return write_shape(BRepPrimAPI_MakeBox(10, 8, 6).Shape(), path);
+        if (name == "rounded box")
+            return write_shape(rounded_box(), path);
+        if (name == "cylinder")
+            return write_shape(BRepPrimAPI_MakeCylinder(5, 10).Shape(), path);
+        if (name == "cone")
+            return write_shape(BRepPrimAPI_MakeCone(5, 0, 10).Shape(), path);
+        if (name == "sphere")
+            return write_shape(BRepPrimAPI_MakeSphere(5).Shape(), path);
+        if (name == "tube")
+            return write_shape(tube_over(BRepBuilderAPI_MakeEdge(circle).Shape()), path);
+        if (name == "creased tube")
+            return write_shape(tube_over(drop_curve()), path);
+        if (name == "half tubes")
+            return write_shape(half_tubes(), path);
+        if (name == "three sheets")
+            return write_shape(three_sheets(), path);
+        if (name == "touching boxes")
+            return write_shape(touching_boxes(), path);
+        return false;
     } catch (const Standard_Failure&) {
         return false;
     }

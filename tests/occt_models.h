@@ -25,4 +25,13 @@ bool write_unbounded_plane(const std::string& path);
 /// One shape of a file in a compound, at its own place and a second file's worth away at `scale` times its size.
 bool write_scaled_neighbour(const std::string& from, const std::string& other, double scale, const std::string& path);
 
+/// One of the shapes below by its name, some 10 mm large. False: no such shape, or not written.
+///   "box", "rounded box" (all edges), "cylinder", "cone", "sphere"
+///   "tube"            a cylinder's side alone
+///   "creased tube"    the side of a drop-shaped cylinder, whose surface closes at the drop's tip
+///   "half tubes"      two halves of a tube with common edges
+///   "three sheets"    three squares at one common edge
+///   "touching boxes"  two boxes side by side in a compound, with nothing in common
+bool write_solid(const std::string& name, const std::string& path);
+
 } // namespace trimray::oracle
