@@ -18,15 +18,14 @@ void derive_trees(PackImage& image);
 /// Fills image.cells, image.cell_entries and the faces' grids from trim points and pieces (pack_layout.h, CellEntry).
 void derive_cells(PackImage& image);
 
-/// Fills image.sdf_words from trim points, pieces and each face's sdf_size (set by allocate_trim_memory).
+/// Fills image.sdf_words from trim points, pieces and what allocate_trim_memory set: image.trim_textures and each
+/// face's sdf_size.
 void derive_sdf(PackImage& image);
 
-enum class TrimLayout { Isotropic, Square };
-
-/// Sets each trimmed face's sdf_size so that the textures take about total_bytes: M_i = ceil(M_total A_i / sum A),
-/// H_i = floor(sqrt(M_i)) (paper eq. 4, 5) in the square layout; the isotropic one has equal texels on the surface.
-/// Bytes are texels here: what rows padded to whole words take beyond H_i^2 comes on top.
-void allocate_trim_memory(PackImage& image, double total_bytes, TrimLayout layout);
+/// Sets image.trim_textures, and each trimmed face's sdf_size so that the textures take about total_bytes: M_i =
+/// ceil(M_total A_i / sum A), H_i = floor(sqrt(M_i)) (paper eq. 4, 5) in the square layout; the isotropic one has equal
+/// texels on the surface. Bytes are texels here: what rows padded to whole words take beyond H_i^2 comes on top.
+void allocate_trim_memory(PackImage& image, double total_bytes, const TrimTextureOptions& options);
 
 /// Bytes the model's trims take in the kd-tree baseline, the unit of `--trim-memory 50%`.
 double kd_trim_bytes(const PackImage& image);

@@ -1,5 +1,6 @@
 // Distance textures: their sizes from the memory allowed (paper, eq. 4 and 5) and their texels.
 #include "format/alike_trims.h"
+#include "format/curve_distance.h"
 #include "format/derive.h"
 #include "format/distance_field.h"
 
@@ -37,31 +38,55 @@ uint words_of(uint sdf_size)
     return ((sdf_size & 0xffffu) + 3) / 4 * (sdf_size >> 16);
 }
 
+/// Signed distances of a face's texels, in the unit of extent_mm, and by how much they may be off.
+struct TexelDistances {
+    std::vector<float> values; // width * height, or more than `reach` (infinite), positive inside
+    double error = 0;
+};
+
+TexelDistances distances_to_mask(std::span<const MonotonePiece> pieces, uint width, uint height, double texel_u,
+                                 double texel_v, double reach)
+{
+    const uint oversampling = sdf_oversampling(width, height);
+    const double pixel_u = texel_u / oversampling, pixel_v = texel_v / oversampling;
+    const TrimMask mask = scan_convert(pieces, pixel_centres(width * oversampling, height * oversampling));
+    // The loop runs between two pixels of different kinds, so the distance to the nearest other pixel is up to
+    // `unresolved` too long and never too short; half a pixel less of it halves the error.
+    const double shift = 0.25 * (pixel_u + pixel_v);
+    const double unresolved = unresolved_distance(mask, pieces, pixel_u, pixel_v);
+    TexelDistances distances;
+    distances.error = std::max(shift, unresolved - shift);
+    distances.values = signed_distances(mask, oversampling, pixel_u, pixel_v, reach + shift);
+    for (float& d : distances.values)
+        d = static_cast<float>(d > 0 ? std::max(d - shift, 0.0) : std::min(d + shift, 0.0));
+    return distances;
+}
+
+TexelDistances distances_to_curves(std::span<const MonotonePiece> pieces, uint width, uint height, double texel_u,
+                                   double texel_v, double reach)
+{
+    return {curve_distances(pieces, pixel_centres(width, height), texel_u, texel_v, reach),
+            (kChordDeviation + kDistanceRounding) * reach};
+}
+
 void fill_texture(PackImage& image, FaceRecord& face)
 {
     const uint width = face.sdf_size & 0xffffu, height = face.sdf_size >> 16;
-    const uint oversampling = sdf_oversampling(width, height);
     const bool measured = face.extent_mm[0] > 0 && face.extent_mm[1] > 0;
     const double texel_u = (measured ? static_cast<double>(face.extent_mm[0]) : 1.0) / width;
     const double texel_v = (measured ? static_cast<double>(face.extent_mm[1]) : 1.0) / height;
     const double texel = rounded_up(std::max(texel_u, texel_v));
-    const double pixel_u = texel_u / oversampling, pixel_v = texel_v / oversampling;
 
     std::vector<MonotonePiece> pieces;
     for (uint i = 0; i < face.piece_count; ++i)
         pieces.push_back(
             load_piece(image.trim_points.data(), face.first_point, image.trim_pieces[face.first_piece + i]));
-    const TrimMask mask = scan_convert(pieces, width * oversampling, height * oversampling);
-    const double shift = 0.25 * (pixel_u + pixel_v);
-    const double farthest = 129 * kSdfTexelQuantum * texel + shift; // levels end at 127 and 128 quanta
-    const std::vector<float> distances = signed_distances(mask, oversampling, pixel_u, pixel_v, farthest);
+    const double reach = 129 * kSdfTexelQuantum * texel; // levels end at 127 and 128 quanta
+    const auto distances_to = image.trim_textures.source == TrimSource::Mask ? distances_to_mask : distances_to_curves;
+    const TexelDistances distances = distances_to(pieces, width, height, texel_u, texel_v, reach);
 
-    // The loop runs between two pixels of different kinds, so the distance to the nearest other pixel is up to
-    // `unresolved` too long and never too short; half a pixel less of it halves the error.
-    const double unresolved = unresolved_distance(mask, pieces, pixel_u, pixel_v);
-    const double sample_error = std::max(shift, unresolved - shift) / texel;
     // |B - d| <= sqrt(hu^2 + hv^2) / 2 + q / 2 + e
-    const double band = 0.5 * std::hypot(texel_u, texel_v) / texel + 0.5 * kSdfTexelQuantum + sample_error;
+    const double band = 0.5 * std::hypot(texel_u, texel_v) / texel + 0.5 * kSdfTexelQuantum + distances.error / texel;
     face.sdf_texel_mm = static_cast<float>(texel);
     face.sdf_band_texels = band < kNeverDecides ? static_cast<float>(rounded_up(band * (1 + 1e-6))) : kNeverDecides;
 
@@ -69,9 +94,8 @@ void fill_texture(PackImage& image, FaceRecord& face)
     uint* words = image.sdf_words.data() + face.sdf_first_word;
     for (uint y = 0; y < height; ++y)
         for (uint x = 0; x < width; ++x) {
-            const double d = distances[static_cast<size_t>(y) * width + x];
-            const double shifted = d > 0 ? std::max(d - shift, 0.0) : std::min(d + shift, 0.0);
-            const double level = std::round(128 + shifted / texel / kSdfTexelQuantum);
+            const double d = distances.values[static_cast<size_t>(y) * width + x];
+            const double level = std::round(128 + d / texel / kSdfTexelQuantum);
             const uint b = static_cast<uint>(std::clamp(level, 0.0, 255.0));
             words[y * row_words + x / 4] |= b << (8 * (x % 4));
         }
@@ -123,8 +147,9 @@ void derive_sdf(PackImage& image)
     }
 }
 
-void allocate_trim_memory(PackImage& image, double total_bytes, TrimLayout layout)
+void allocate_trim_memory(PackImage& image, double total_bytes, const TrimTextureOptions& options)
 {
+    image.trim_textures = options;
     double total_area = 0;
     double faces = 0;
     for (FaceRecord& face : image.faces) {
@@ -143,7 +168,7 @@ void allocate_trim_memory(PackImage& image, double total_bytes, TrimLayout layou
         if (face.piece_count == 0)
             continue;
         const double area = face.area_mm2;
-        if (layout == TrimLayout::Square) {
+        if (options.layout == TrimLayout::Square) {
             // M_i = ceil(M_total A_i / sum A), H_i = floor(sqrt(M_i))
             const double bytes = std::ceil(total_bytes * area / total_area);
             const uint side = static_cast<uint>(std::min<double>(kMaxSdfSide, std::floor(std::sqrt(bytes))));

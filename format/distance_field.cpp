@@ -1,5 +1,6 @@
 #include "format/distance_field.h"
 
+#include <algorithm>
 #include <bit>
 #include <cassert>
 #include <cmath>
@@ -11,10 +12,10 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// First pixel whose centre is at x or beyond, in pixels.
-int first_centre(double x)
+/// First of `count` points at first + i * step that is at x or beyond.
+int first_point_from(double x, double first, double step, uint count)
 {
-    return static_cast<int>(std::ceil(x - 0.5));
+    return static_cast<int>(std::clamp<double>(std::ceil((x - first) / step), 0, count));
 }
 
 /// row[x] ^= row[x - 1] from left to right, for pixels of 0 and 1: eight at a time, as the bytes of one word.
@@ -58,18 +59,20 @@ void find_changes(const uint8_t* row, uint width, std::vector<int>& changes)
 
 } // namespace
 
-TrimMask scan_convert(std::span<const MonotonePiece> pieces, uint width, uint height)
+SampleGrid pixel_centres(uint width, uint height)
 {
-    TrimMask mask;
-    mask.width = width;
-    mask.height = height;
-    mask.inside.assign(static_cast<size_t>(width) * height, 0);
+    return {width, height, 0.5 / width, 0.5 / height, 1.0 / width, 1.0 / height};
+}
+
+TrimMask scan_convert(std::span<const MonotonePiece> pieces, const SampleGrid& grid)
+{
+    const uint width = grid.width, height = grid.height;
+    TrimMask mask{width, height, std::vector<uint8_t>(static_cast<size_t>(width) * height, 0)};
     // each crossing flips all pixels right of it: mark the first, then sum along the row
     for (const MonotonePiece& piece : pieces) {
-        const double v_lo = piece.v_lo(), v_hi = piece.v_hi();
-        const int last = std::min(static_cast<int>(height), first_centre(v_hi * height));
-        for (int y = std::max(0, first_centre(v_lo * height)); y < last; ++y) {
-            const int x = std::max(0, first_centre(u_at_v(piece, (y + 0.5) / height) * width));
+        const int last = first_point_from(piece.v_hi(), grid.v0, grid.dv, height);
+        for (int y = first_point_from(piece.v_lo(), grid.v0, grid.dv, height); y < last; ++y) {
+            const int x = first_point_from(u_at_v(piece, grid.v0 + y * grid.dv), grid.u0, grid.du, width);
             if (x < static_cast<int>(width))
                 mask.inside[static_cast<size_t>(y) * width + x] ^= 1;
         }

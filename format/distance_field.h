@@ -12,15 +12,24 @@
 
 namespace trimray {
 
-/// A binary picture of a face's domain. Shapes: inside[y * width + x], row 0 at v = 0. Pixel (x, y) is 1 where its
-/// centre ((x + 0.5) / width, (y + 0.5) / height) is inside by the even-odd rule. What lies around it is outside.
+/// Points of a face's domain: (i, j) lies at u = u0 + i du, v = v0 + j dv (uv_face).
+struct SampleGrid {
+    uint width = 0, height = 0;
+    double u0 = 0, v0 = 0, du = 0, dv = 0;
+};
+
+/// The centres of width x height pixels that fill the domain: ((i + 0.5) / width, (j + 0.5) / height).
+SampleGrid pixel_centres(uint width, uint height);
+
+/// A binary picture of a face's domain. Shapes: inside[y * width + x], row 0 at the least v. Pixel (x, y) is 1 where
+/// its point of the grid is inside by the even-odd rule. What lies around it is outside.
 struct TrimMask {
     uint width = 0, height = 0;
     std::vector<uint8_t> inside;
 };
 
-/// The mask of `pieces` (a face's closed loops, uv_face) by scan conversion: crossings of each row's centre line.
-TrimMask scan_convert(std::span<const MonotonePiece> pieces, uint width, uint height);
+/// The mask of `pieces` (a face's closed loops, uv_face) by scan conversion: each row's crossings, in double.
+TrimMask scan_convert(std::span<const MonotonePiece> pieces, const SampleGrid& grid);
 
 /// Distances from the centres of every `oversampling`-th pixel (odd; the middle one of each texel) to the nearest
 /// centre of the other kind, positive inside, +-infinity if there is none. Pixels are pixel_u by pixel_v in any unit of

@@ -89,11 +89,15 @@ struct FactRecord {
     double world_origin_mm[3], world_scale_mm;
     float max_turning_rad, max_aspect;
     uint32_t max_leaves_per_patch;
-    uint32_t reserved;
+    uint32_t trim_textures; // kTexturesOfMasks, kTexturesSquare
     uint64_t derived_bytes; // of all derived sections, in memory; counts against the budget when they are rebuilt
-    uint64_t reserved2;
+    uint64_t reserved;
 };
 static_assert(sizeof(FactRecord) == 112);
+
+// FactRecord.trim_textures
+inline constexpr uint32_t kTexturesOfMasks = 1; // TrimSource::Mask
+inline constexpr uint32_t kTexturesSquare = 2;  // TrimLayout::Square
 
 // Sections that are not plain arrays of records.
 inline constexpr std::string_view kSectionFacts = "FACT";

@@ -39,6 +39,15 @@ struct LeafOptions {
     uint max_leaves_per_patch = 1024;
 };
 
+enum class TrimSource { Curve, Mask };
+enum class TrimLayout { Isotropic, Square };
+
+/// How distance textures are made. Part of the pack, so that a compact one gives the same textures at load.
+struct TrimTextureOptions {
+    TrimSource source = TrimSource::Curve;     // true distances to the pieces, or the paper's: to a mask's pixels
+    TrimLayout layout = TrimLayout::Isotropic; // texels equal on the surface, or the paper's equal numbers of them
+};
+
 struct PackImage {
     std::vector<PartRecord> parts;
     std::vector<InstanceRecord> instances;
@@ -62,6 +71,7 @@ struct PackImage {
     double world_origin_mm[3] = {0, 0, 0}; // of the top tree's unit space
     double world_scale_mm = 1;
     LeafOptions leaf_options;
+    TrimTextureOptions trim_textures;
     bool compact = false; // leaves, nodes, cells, textures are left out and rebuilt at load
     std::vector<std::byte> preview_256_png;
     std::vector<std::byte> preview_512_png;

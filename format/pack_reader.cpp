@@ -457,7 +457,13 @@ private:
         std::copy_n(facts_.world_origin_mm, 3, image.world_origin_mm);
         image.world_scale_mm = facts_.world_scale_mm;
         image.leaf_options = {facts_.max_turning_rad, facts_.max_aspect, facts_.max_leaves_per_patch};
-        if (facts_.reserved != 0 || facts_.reserved2 != 0)
+        image.trim_textures.source =
+            (facts_.trim_textures & kTexturesOfMasks) != 0 ? TrimSource::Mask : TrimSource::Curve;
+        image.trim_textures.layout =
+            (facts_.trim_textures & kTexturesSquare) != 0 ? TrimLayout::Square : TrimLayout::Isotropic;
+        if ((facts_.trim_textures & ~(kTexturesOfMasks | kTexturesSquare)) != 0)
+            fault(3237, std::string(kSectionFacts), fmt::format("texture options {:#x}", facts_.trim_textures));
+        if (facts_.reserved != 0)
             fault(3108, std::string(kSectionFacts), "reserved bytes are not zero");
         if (!image.compact)
             return;

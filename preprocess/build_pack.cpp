@@ -302,7 +302,7 @@ void run(const CadModel& model, const BuildOptions& options, PackImage& image, B
     derive_cells(image);
     const double sdf_bytes = options.trim_memory_bytes >= 0 ? options.trim_memory_bytes
                                                             : options.trim_memory_fraction * kd_trim_bytes(image);
-    allocate_trim_memory(image, sdf_bytes, options.trim_layout);
+    allocate_trim_memory(image, sdf_bytes, options.trim_textures);
     derive_sdf(image);
     report.trims_seconds += seconds_since(start);
 

@@ -15,7 +15,7 @@ namespace trimray {
 struct BuildOptions {
     TrimOptions trims;
     LeafOptions leaves;
-    TrimLayout trim_layout = TrimLayout::Isotropic;
+    TrimTextureOptions trim_textures;
     double trim_memory_fraction = 1.0; // of kd_trim_bytes; used when trim_memory_bytes is negative
     double trim_memory_bytes = -1;
     bool compact = false;

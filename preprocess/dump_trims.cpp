@@ -137,7 +137,7 @@ bool dump_face(const PackImage& image, const FaceRecord& face, const std::filesy
         cells.fill([&](double u, double v) { return cell_color(image, face, u, v); });
     cells.draw(pieces);
 
-    const TrimMask inside = scan_convert(pieces, static_cast<uint>(width), static_cast<uint>(height));
+    const TrimMask inside = scan_convert(pieces, pixel_centres(static_cast<uint>(width), static_cast<uint>(height)));
     const Panel mask{picture, 2 * kMargin + width, width, height};
     mask.fill([&](double u, double v) {
         const bool in = inside.inside[static_cast<size_t>(v * height) * width + static_cast<size_t>(u * width)] != 0;

@@ -95,7 +95,8 @@ Status parse_trim_memory(const std::string& text, BuildOptions& build)
 Result<std::optional<Options>> parse_options(int argc, char** argv)
 {
     Options options;
-    std::string surfaces = "native", layout = "isotropic", trim_memory = "100%", memory_limit = "8GiB";
+    std::string surfaces = "native", source = "curve", layout = "isotropic", trim_memory = "100%",
+                memory_limit = "8GiB";
     bool no_previews = false;
     CLI::App app{"Converts a CAD model into a scene pack that trimray ray traces directly.", "trimray-pack"};
     app.footer(kFooter);
@@ -107,6 +108,10 @@ Result<std::optional<Options>> parse_options(int argc, char** argv)
         ->capture_default_str();
     app.add_option("--trim-memory", trim_memory,
                    "Distance textures: a share of the kd-tree's size (50%), a size (8MiB), or 0 for none")
+        ->capture_default_str();
+    app.add_option("--trim-source", source,
+                   "Distances to the trim curves themselves, or the paper's: to a mask's pixels")
+        ->check(CLI::IsMember({"curve", "mask"}))
         ->capture_default_str();
     app.add_option("--trim-layout", layout, "Texels with equal sides on the surface, or the paper's square textures")
         ->check(CLI::IsMember({"isotropic", "square"}))
@@ -141,7 +146,8 @@ Result<std::optional<Options>> parse_options(int argc, char** argv)
         return Error{ErrorCode::Usage, "--memory-limit", fmt::format("'{}' is no size like 8GiB", memory_limit)};
     options.limits.memory_bytes = static_cast<uint64_t>(*memory);
     options.import.native_surfaces = surfaces == "native";
-    options.build.trim_layout = layout == "square" ? TrimLayout::Square : TrimLayout::Isotropic;
+    options.build.trim_textures.source = source == "mask" ? TrimSource::Mask : TrimSource::Curve;
+    options.build.trim_textures.layout = layout == "square" ? TrimLayout::Square : TrimLayout::Isotropic;
     options.previews = !no_previews;
     return std::optional(options);
 }
@@ -156,7 +162,8 @@ std::string provenance_options(const Options& options)
         json["trim_memory_bytes"] = options.build.trim_memory_bytes;
     else
         json["trim_memory_fraction"] = options.build.trim_memory_fraction;
-    json["trim_layout"] = options.build.trim_layout == TrimLayout::Square ? "square" : "isotropic";
+    json["trim_source"] = options.build.trim_textures.source == TrimSource::Mask ? "mask" : "curve";
+    json["trim_layout"] = options.build.trim_textures.layout == TrimLayout::Square ? "square" : "isotropic";
     json["compact"] = options.build.compact;
     return json.dump();
 }

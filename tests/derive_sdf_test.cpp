@@ -53,7 +53,7 @@ TEST(derive_sdf, masks_equal_an_exact_crossing_count)
         add_face(image, {random_loop(rng, 25)});
     for (uint f = 0; f < image.faces.size(); ++f) {
         const std::vector<MonotonePiece> pieces = pieces_of(image, f);
-        const TrimMask mask = scan_convert(pieces, 96, 64);
+        const TrimMask mask = scan_convert(pieces, pixel_centres(96, 64));
         for (uint y = 0; y < mask.height; ++y)
             for (uint x = 0; x < mask.width; ++x) {
                 const double u = (x + 0.5) / mask.width, v = (y + 0.5) / mask.height;
@@ -123,24 +123,28 @@ void expect_band(const PackImage& image, uint f, double extent_u, double extent_
 
 TEST(derive_sdf, outside_its_band_the_texture_is_right)
 {
-    PackImage image;
-    std::vector<std::array<double, 2>> extents;
-    for (const auto& loops : shapes_for_masks())
-        for (const double extent_v : {10.0, 3.0}) {
-            add_face(image, loops, 10, static_cast<float>(extent_v));
-            image.faces.back().sdf_size = 40u | (extent_v == 3 ? 12u : 40u) << 16;
-            extents.push_back({10, extent_v});
+    for (const TrimSource source : {TrimSource::Curve, TrimSource::Mask}) {
+        PackImage image;
+        image.trim_textures.source = source;
+        std::vector<std::array<double, 2>> extents;
+        for (const auto& loops : shapes_for_masks())
+            for (const double extent_v : {10.0, 3.0}) {
+                add_face(image, loops, 10, static_cast<float>(extent_v));
+                image.faces.back().sdf_size = 40u | (extent_v == 3 ? 12u : 40u) << 16;
+                extents.push_back({10, extent_v});
+            }
+        derive_sdf(image);
+        for (uint f = 0; f < image.faces.size(); ++f) {
+            EXPECT_LT(image.faces[f].sdf_band_texels, 1.5f) << "face " << f; // the tips of the star press it up
+            expect_band(image, f, extents[f][0], extents[f][1], 50 + f);
         }
-    derive_sdf(image);
-    for (uint f = 0; f < image.faces.size(); ++f) {
-        EXPECT_LT(image.faces[f].sdf_band_texels, 1.5f) << "face " << f; // the tips of the star press it up
-        expect_band(image, f, extents[f][0], extents[f][1], 50 + f);
     }
 }
 
 TEST(derive_sdf, slivers_below_the_masks_pixels_widen_the_band_until_nothing_is_wrong)
 {
     PackImage image;
+    image.trim_textures.source = TrimSource::Mask;
     for (const double radius : {0.1, 0.025, 0.01, 0.003, 0.001, 0.0003, 0.0001}) {
         add_face(image, {polygon(kSquare), circle(0.503, 0.511, radius, radius)});
         image.faces.back().sdf_size = 40u | 40u << 16;
@@ -168,7 +172,7 @@ TEST(derive_sdf, square_layout_follows_equations_4_and_5_to_the_byte)
     double sum = 0;
     for (int i = 0; i < 4; ++i)
         sum += image.faces[static_cast<size_t>(i)].area_mm2;
-    allocate_trim_memory(image, total, TrimLayout::Square);
+    allocate_trim_memory(image, total, {TrimSource::Mask, TrimLayout::Square});
     for (size_t i = 0; i < 4; ++i) {
         const double bytes = std::ceil(total * image.faces[i].area_mm2 / sum);
         const uint side = static_cast<uint>(std::floor(std::sqrt(bytes)));
@@ -191,7 +195,7 @@ TEST(derive_sdf, isotropic_layout_keeps_to_the_total_and_spares_small_faces)
     for (const auto& e : extents)
         add_face(image, {circle(0.5, 0.5, 0.5, 0.5)}, e[0], e[1]);
     for (const double total : {500.0, 5000.0, 100000.0}) {
-        allocate_trim_memory(image, total, TrimLayout::Isotropic);
+        allocate_trim_memory(image, total, {});
         double texels = 0;
         for (const FaceRecord& face : image.faces) {
             const uint width = face.sdf_size & 0xffffu, height = face.sdf_size >> 16;
@@ -205,7 +209,7 @@ TEST(derive_sdf, isotropic_layout_keeps_to_the_total_and_spares_small_faces)
         EXPECT_LE(texels, total);
         EXPECT_GE(texels, 0.8 * total);
     }
-    allocate_trim_memory(image, 0, TrimLayout::Isotropic);
+    allocate_trim_memory(image, 0, {});
     derive_sdf(image);
     EXPECT_TRUE(image.sdf_words.empty());
     for (const FaceRecord& face : image.faces)
@@ -218,7 +222,7 @@ TEST(derive_sdf, bytes_do_not_depend_on_the_number_of_threads)
     for (int i = 0; i < 8; ++i)
         for (const auto& loops : shapes_for_masks())
             add_face(one, loops, 3, 2);
-    allocate_trim_memory(one, 20000, TrimLayout::Isotropic);
+    allocate_trim_memory(one, 20000, {});
     PackImage two = one;
     {
         const tbb::global_control single(tbb::global_control::max_allowed_parallelism, 1);

@@ -23,7 +23,7 @@ TEST(dump_trims, draws_each_trimmed_face_and_lists_all)
     image.faces.back().flags = kFaceNaturalBorder;
     add_face(image, {star(0.5, 0.5, 0.5, 0.2, 5)}, 1, 100);
     derive_cells(image);
-    allocate_trim_memory(image, 2000, TrimLayout::Isotropic);
+    allocate_trim_memory(image, 2000, {});
     derive_sdf(image);
     const auto folder = std::filesystem::temp_directory_path() / ("trimray_dump_" + std::to_string(::getpid()));
     ASSERT_TRUE(dump_trims(image, folder.string()).ok());

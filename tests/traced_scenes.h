@@ -124,7 +124,7 @@ struct TracedScene {
         derive_trees(image);
         derive_cells(image);
         if (with_textures) {
-            allocate_trim_memory(image, 20000, TrimLayout::Isotropic);
+            allocate_trim_memory(image, 20000, {});
             derive_sdf(image);
         }
         auto scene = std::make_shared<Scene>();
