@@ -14,15 +14,15 @@ SHARED_OPEN
 struct FetchSource {
     const float* control_points;
     const uint* cells;
-    const uint* cell_entries; // word, eta
+    const CellEntry* cell_entries;
     const float* trim_points;
     const uint* sdf_words;
 };
 
 static inline FetchSource fetch_source(const PackImage& image)
 {
-    return {image.control_points.data(), image.cells.data(), reinterpret_cast<const uint*>(image.cell_entries.data()),
-            image.trim_points.data(), image.sdf_words.data()};
+    return {image.control_points.data(), image.cells.data(), image.cell_entries.data(), image.trim_points.data(),
+            image.sdf_words.data()};
 }
 
 FN scalar fetch_control(FETCH_PARAM uint index)
@@ -33,17 +33,18 @@ FN integer fetch_cell(FETCH_PARAM integer index)
 {
     return gather(source.cells, index);
 }
-FN integer fetch_entry_word(FETCH_PARAM integer index)
+FN uint fetch_entry_word(FETCH_PARAM uint index)
 {
-    return gather(source.cell_entries, index + index);
+    return source.cell_entries[index].word;
 }
-FN real fetch_entry_eta(FETCH_PARAM integer index)
+FN scalar fetch_entry_eta(FETCH_PARAM uint index)
 {
-    return gather(reinterpret_cast<const float*>(source.cell_entries) + 1, index + index);
+    return source.cell_entries[index].eta;
 }
-FN real2 fetch_trim_point(FETCH_PARAM integer index)
+FN scalar2 fetch_trim_point(FETCH_PARAM uint index)
 {
-    return real2(gather(source.trim_points, index + index), gather(source.trim_points + 1, index + index));
+    const float* p = source.trim_points + 2 * std::size_t(index);
+    return scalar2(p[0], p[1]);
 }
 FN integer fetch_sdf_word(FETCH_PARAM integer index)
 {

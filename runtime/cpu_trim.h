@@ -12,20 +12,27 @@
 
 SHARED_OPEN
 
-/// Lanes of `open`, all in mixed cells with the words `cell`, that lie inside by the pieces of their cells.
+/// Lanes of `open`, all in mixed cells with the words `cell`, that lie inside by the pieces of their cells: one cell at
+/// a time for all lanes in it, of which a packet has few, so that entries and points are read once.
 FN mask inside_by_pieces(const FetchSource& source, const TrimFace& trim, integer cell, real2 uv, mask open,
                          uint64_t& curve_tests)
 {
     mask inside = cell_says_inside(cell);
-    integer at = cell_first_entry(trim, cell);
-    while (any_lane(open)) {
-        at = select(open, at, integer(trim.first_entry));
-        const integer entry = fetch_entry_word(FETCH_PASS at);
-        const mask crossed = entry_crossed(FETCH_PASS trim, entry, fetch_entry_eta(FETCH_PASS at), uv);
-        curve_tests += uint64_t(__builtin_popcount(lane_bits(open)));
-        inside = differ(inside, open && crossed);
-        open = open && !entry_is_last(entry);
-        at = at + integer(1u);
+    alignas(64) uint words[kLanes];
+    store(cell, words);
+    for (uint left = lane_bits(open); left != 0;) {
+        const uint word = words[__builtin_ctz(left)];
+        const mask here = open && cell == integer(word);
+        const uint here_bits = lane_bits(here);
+        left &= ~here_bits;
+        uint at = cell_first_entry(trim, word), entry;
+        do {
+            entry = fetch_entry_word(FETCH_PASS at);
+            inside =
+                differ(inside, here && entry_crossed(FETCH_PASS trim, entry, fetch_entry_eta(FETCH_PASS at), uv, here));
+            curve_tests += uint64_t(__builtin_popcount(here_bits));
+            ++at;
+        } while (!entry_is_last(entry));
     }
     return inside;
 }

@@ -84,7 +84,7 @@ bool inside_trims(FaceRecord face, vec2 uv)
     uint at = cell_first_entry(trim, word);
     for (;;) {
         CellEntry entry = cell_entries[at];
-        inside = differ(inside, entry_crossed(trim, entry.word, entry.eta, uv));
+        inside = differ(inside, entry_crossed(trim, entry.word, entry.eta, uv, true));
         ++curve_tests;
         iterations += 1u + kCurveIterations;
         if (iteration_limit > 0u && iterations > kRoundIterations) {

@@ -12,8 +12,8 @@
 
 SHARED_OPEN
 
-// Data comes through fetch_cell, fetch_entry_word, fetch_entry_eta, fetch_trim_point (index in points) and
-// fetch_sdf_word.
+// Data comes through fetch_cell and fetch_sdf_word, a lane each, and fetch_entry_word, fetch_entry_eta and
+// fetch_trim_point (index in points), the same for all lanes: a cell's pieces are asked for the lanes in that cell.
 
 // The constants of one face
 struct TrimFace {
@@ -58,84 +58,106 @@ FN mask cell_says_inside(integer word)
 {
     return (word & integer(1u)) != integer(0u);
 }
-FN integer cell_first_entry(TrimFace face, integer word)
+FN uint cell_first_entry(TrimFace face, uint word)
 {
-    return integer(face.first_entry) + (word >> integer(2u));
+    return face.first_entry + (word >> 2);
+}
+FN bool entry_is_last(uint word)
+{
+    return (word & kEntryLast) != 0u;
 }
 
-// u < P(v) for a monotone cubic with the point's coordinates subtracted from its control points, v0 < 0 <= v3:
-// Newton on v(t) = 0 kept in its bracket; the sign of u(t) there. Bernstein form, so that ends are exact.
-FN_LARGE mask left_of_cubic(real u0, real u1, real u2, real u3, real v0, real v1, real v2, real v3)
+// u < P(v) for the monotone cubic with control points a, b, c, d, a.y < d.y, of the lanes `asked`, whose uv lies
+// between the ends' v and strictly between their u. On the curve, f(t) = (V(t) - v) / dv + (U(t) - u) / du grows from
+// f(0) <= 0 to f(1) >= 0, and near its root U(t) - u and V(t) - v have opposite effect: then, whatever is left of f,
+// the curve is known to pass on one side of uv. Newton on f, kept in its bracket, gets there in a step or two; to the
+// end it goes only where uv lies on the curve. Bernstein form of the distances from uv, so that ends are exact.
+FN_LARGE mask left_of_cubic(scalar2 a, scalar2 b, scalar2 c, scalar2 d, real2 uv, mask asked)
 {
+    bool u_grows = a.x < d.x;
+    scalar smallest_du = u_grows ? 1e-30f : -1e-30f;
+    scalar per_du = 0.5f / (u_grows ? max(d.x - a.x, smallest_du) : min(d.x - a.x, smallest_du));
+    scalar per_dv = 0.5f / max(d.y - a.y, 1e-30f);
+    // f(t) = s(t) - s(uv), s(t) = ((k3 t + k2) t + k1) t, s(1) = 1: about t, where a curve's parameter runs evenly
+    scalar s1 = (b.x - a.x) * per_du + (b.y - a.y) * per_dv;
+    scalar s2 = (c.x - a.x) * per_du + (c.y - a.y) * per_dv;
+    scalar k1 = 3.0f * s1;
+    scalar k2 = 3.0f * (s2 - 2.0f * s1);
+    scalar k3 = 1.0f - 3.0f * (s2 - s1);
+    PRECISE real u0 = a.x - uv.x;
+    PRECISE real u1 = b.x - uv.x;
+    PRECISE real u2 = c.x - uv.x;
+    PRECISE real u3 = d.x - uv.x;
+    PRECISE real v0 = a.y - uv.y;
+    PRECISE real v1 = b.y - uv.y;
+    PRECISE real v2 = c.y - uv.y;
+    PRECISE real v3 = d.y - uv.y;
     real lo = real(0.0f);
     real hi = real(1.0f);
-    PRECISE real t = -v0 / max(v3 - v0, real(1e-30f)); // the chord's root
-    mask moving = !(t < 0.0f) || t < 0.0f;
+    PRECISE real t = clamp(-(u0 * per_du + v0 * per_dv), real(0.0f), real(1.0f));
+    mask left = asked;
+    mask moving = asked;
     for (int i = 0; i < 32 && any_lane(moving); ++i) {
         PRECISE real s = 1.0f - t;
-        PRECISE real a = s * v0 + t * v1; // de Casteljau: the last two points give the value and the slope
-        PRECISE real b = s * v1 + t * v2;
-        PRECISE real c = s * v2 + t * v3;
-        PRECISE real d = s * a + t * b;
-        PRECISE real e = s * b + t * c;
-        PRECISE real value = s * d + t * e;
-        PRECISE real slope = 3.0f * (e - d);
-        lo = select(moving && value < 0.0f, t, lo);
-        hi = select(moving && value >= 0.0f, t, hi);
-        PRECISE real next = t - value / max(slope, real(1e-30f));
+        PRECISE real w1 = 3.0f * s * s * t;
+        PRECISE real w2 = 3.0f * s * t * t;
+        PRECISE real w0 = s * s * s;
+        PRECISE real w3 = t * t * t;
+        PRECISE real u = (w0 * u0 + w1 * u1) + (w2 * u2 + w3 * u3);
+        PRECISE real v = (w0 * v0 + w1 * v1) + (w2 * v2 + w3 * v3);
+        left = select(moving, u > 0.0f, left);
+        // the curve reaches uv's v at a t no smaller (v <= 0) or no larger (v >= 0): with u there on the same side
+        mask decided = u_grows ? select(left, v <= 0.0f, v >= 0.0f) : select(left, v >= 0.0f, v <= 0.0f);
+        lo = select(v < 0.0f, t, lo);
+        hi = select(v < 0.0f, hi, t);
+        PRECISE real slope = k1 + t * (2.0f * k2 + 3.0f * t * k3);
+        PRECISE real next = t - (u * per_du + v * per_dv) / max(slope, real(1e-30f));
         // a step that leaves the bracket is replaced by its middle
         next = select(next > lo && next < hi, next, 0.5f * (lo + hi));
-        mask still = moving && abs(next - t) > 2.0f * kRounding && hi - lo > kRounding;
-        t = select(moving, next, t);
-        moving = still;
+        moving = moving && !decided && abs(next - t) > 2.0f * kRounding && hi - lo > kRounding;
+        t = next;
     }
-    PRECISE real s = 1.0f - t;
-    PRECISE real u = s * s * s * u0 + 3.0f * s * t * (s * u1 + t * u2) + t * t * t * u3;
-    return u > 0.0f;
+    return left;
 }
 
 // Does the path from uv to the cell's reference corner cross the piece of this entry an odd number of times?
-FN_LARGE mask entry_crossed(FETCH_PARAM TrimFace face, integer word, real eta, real2 uv)
+// Answers the lanes `asked`.
+FN mask entry_crossed(FETCH_PARAM TrimFace face, uint word, scalar eta, real2 uv, mask asked)
 {
-    integer first = integer(face.first_point) + (word >> integer(kPiecePointShift));
-    mask cubic = (word & integer(kPieceCubic)) != integer(0u);
-    integer last = first + select(cubic, integer(3u), integer(1u));
-    real2 p0 = fetch_trim_point(FETCH_PASS first);
-    real2 p3 = fetch_trim_point(FETCH_PASS last);
-    mask upward = p0.y <= p3.y;
-    real2 a = select(upward, p0, p3); // a.v <= b.v
-    real2 b = select(upward, p3, p0);
+    uint first = face.first_point + (word >> kPiecePointShift);
+    bool cubic = (word & kPieceCubic) != 0u;
+    scalar2 p0 = fetch_trim_point(FETCH_PASS first);
+    scalar2 p3 = fetch_trim_point(FETCH_PASS first + (cubic ? 3u : 1u));
+    bool upward = p0.y <= p3.y;
+    scalar2 a = upward ? p0 : p3; // a.v <= b.v
+    scalar2 b = upward ? p3 : p0;
 
-    mask has_eta = !(eta == real(kNoEta));
+    bool has_eta = eta != kNoEta;
+    bool u_grows = a.x < b.x;
     mask below_eta = uv.y < eta;
-    mask in_band = a.y <= uv.y && uv.y < b.y;
-    mask u_grows = a.x < b.x;
-    mask on_path = in_band && (!has_eta || differ(!u_grows, below_eta)); // u grows ? v < eta : v >= eta
-
+    mask on_path = asked && a.y <= uv.y && uv.y < b.y;
+    if (has_eta)
+        on_path = on_path && differ(below_eta, mask(!u_grows));
     mask left = uv.x < min(a.x, b.x);
-    mask between = !left && uv.x < max(a.x, b.x);
-    // u < a.u + (v - a.v) (b.u - a.u) / (b.v - a.v), multiplied out
-    PRECISE real side_u = (uv.x - a.x) * (b.y - a.y);
-    PRECISE real side_v = (uv.y - a.y) * (b.x - a.x);
-    mask left_of_line = side_u < side_v;
-    mask solve = on_path && between && cubic;
-    mask left_of_piece = left_of_line;
-    if (any_lane(solve)) {
-        // lines have no inner control points; their lanes fetch the ends again
-        real2 c1 = fetch_trim_point(FETCH_PASS select(solve, first + integer(1u), first));
-        real2 c2 = fetch_trim_point(FETCH_PASS select(solve, first + integer(2u), first));
-        real2 b1 = select(upward, c1, c2);
-        real2 b2 = select(upward, c2, c1);
-        mask left_of_curve = left_of_cubic(a.x - uv.x, b1.x - uv.x, b2.x - uv.x, b.x - uv.x, a.y - uv.y, b1.y - uv.y,
-                                           b2.y - uv.y, b.y - uv.y);
-        left_of_piece = select(solve, left_of_curve, left_of_line);
+    mask between = on_path && !left && uv.x < max(a.x, b.x);
+    if (any_lane(between)) {
+        mask left_of_piece;
+        if (cubic) {
+            scalar2 c1 = fetch_trim_point(FETCH_PASS first + 1u);
+            scalar2 c2 = fetch_trim_point(FETCH_PASS first + 2u);
+            left_of_piece = left_of_cubic(a, upward ? c1 : c2, upward ? c2 : c1, b, uv, between);
+        } else {
+            // u < a.u + (v - a.v) (b.u - a.u) / (b.v - a.v), multiplied out
+            PRECISE real side_u = (uv.x - a.x) * (b.y - a.y);
+            PRECISE real side_v = (uv.y - a.y) * (b.x - a.x);
+            left_of_piece = side_u < side_v;
+        }
+        left = left || (between && left_of_piece);
     }
-    mask horizontal = on_path && (left || (between && left_of_piece));
-    return differ(horizontal, has_eta && below_eta);
-}
-FN mask entry_is_last(integer word)
-{
-    return (word & integer(kEntryLast)) != integer(0u);
+    mask horizontal = on_path && left;
+    if (has_eta)
+        return differ(horizontal, below_eta);
+    return horizontal;
 }
 
 // Signed distance in texels at uv_face, positive inside: one bilinear look-up in the 8-bit texture
