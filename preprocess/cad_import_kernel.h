@@ -148,21 +148,27 @@ Result<ConvertedPcurve> convert_pcurve(const opencascade::handle<Geom2d_Curve>& 
 /// along u or v, else within 1e-7 of an arc. Fails: InvalidTrim.
 Result<ConvertedPcurve> map_pcurve(const ConvertedPcurve& pcurve, const UvMap& map);
 
+/// A pcurve as a function of its parameter.
+using PcurvePoint = std::function<Vec2d(double)>;
+
 /// Measures a face's pcurves against the curves in space of their edges. Not to be shared between threads.
 class PcurveGauge {
 public:
     explicit PcurveGauge(const TopoDS_Face& face);
 
-    /// Largest distance of S(pcurve(t)), first <= t <= last, from the edge's curve, in mm: of samples, refined around
-    /// the worst of them. 0 where the edge has no curve (a pole).
-    double deviation_mm(const TopoDS_Edge& edge, const opencascade::handle<Geom2d_Curve>& pcurve, double first,
-                        double last) const;
+    /// How far S(pcurve(t)), first <= t <= last, lies from the edge's curve in space: of samples, refined around the
+    /// worst of them. Zeros where the edge has no curve (a pole).
+    struct Deviation {
+        double mm = 0;
+        double along_mm = 0; // the part of it along the surface, which another pcurve could take away
+    };
+    Deviation deviation(const TopoDS_Edge& edge, const PcurvePoint& pcurve, double first, double last) const;
 
-    /// The edge's curve projected onto the surface, over the same parameters and in the same period as `pcurve`. Null
-    /// where the kernel finds none.
-    opencascade::handle<Geom2d_Curve> projected(const TopoDS_Edge& edge,
-                                                const opencascade::handle<Geom2d_Curve>& pcurve, double first,
-                                                double last) const;
+    /// The edge's curve projected onto the surface, point by point from `pcurve` on (so on its side of a seam), within
+    /// `tolerance_mm`, over the same parameters. `deviation_mm` is that of `pcurve`.
+    /// Fails: InvalidTrim (the curves do not run alike, or no smooth curve follows the projected points).
+    Result<SplineCurve2d> projected(const TopoDS_Edge& edge, const PcurvePoint& pcurve, double first, double last,
+                                    double deviation_mm, double tolerance_mm) const;
 
 private:
     TopLoc_Location location_;
@@ -171,9 +177,11 @@ private:
 
 /// The face's loops in the walk's order, in the kernel's uv. `face` must be oriented forward. Edges without a pcurve
 /// are projected onto the surface, which changes the shape, so only where `may_project`; otherwise they are an error.
+/// A pcurve farther from its edge's curve than the edge's tolerance and `resolution_mm` is replaced by a projection of
+/// that curve if the projection is much nearer.
 /// Fails: InvalidTrim, with the reason.
 Result<std::vector<CadLoop>> collect_loops(const TopoDS_Face& face, const TopTools_IndexedMapOfShape& edges,
-                                           bool may_project);
+                                           bool may_project, double resolution_mm);
 
 /// Converts a part: faces, edges, and the faces that could not be converted.
 CadPart convert_part(const PartShape& source, uint32_t part_index, const ImportOptions& options,

@@ -38,7 +38,7 @@ Result<CadFace> convert_face(const TopoDS_Face& face, const TopTools_IndexedMapO
     CadFace out;
     out.reversed = face.Orientation() == TopAbs_REVERSED;
     out.tolerance_mm = BRep_Tool::Tolerance(face);
-    Result<std::vector<CadLoop>> loops = collect_loops(forward, edges, may_project);
+    Result<std::vector<CadLoop>> loops = collect_loops(forward, edges, may_project, tolerance_mm);
     if (!loops)
         return loops.error();
     const Rect2d bounds = conversion_needs_bounds(forward, options) ? uv_bounds(forward) : Rect2d();

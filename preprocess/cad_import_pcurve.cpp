@@ -1,5 +1,6 @@
 // The loops of a face: every edge use of every wire, in the walk's order, with its pcurve as a B-spline in uv.
 #include "preprocess/cad_import_kernel.h"
+#include "preprocess/trim_curve.h"
 
 #include <BRepTools_WireExplorer.hxx>
 #include <BRep_Tool.hxx>
@@ -98,8 +99,44 @@ std::vector<CadLoop> chain(std::vector<CadEdgeUse> uses)
     return loops;
 }
 
+constexpr double kMuchNearer = 0.5; // of the file's pcurve's deviation: what a projection must reach to replace it
+
+/// Measures a use's pcurve, and replaces it where that is worth it.
+void gauge_use(const TopoDS_Edge& edge, const PcurveGauge& gauge, const PcurvePoint& pcurve, double first, double last,
+               double resolution_mm, CadEdgeUse& use)
+{
+    const PcurveGauge::Deviation deviation = gauge.deviation(edge, pcurve, first, last);
+    use.deviation_mm = deviation.mm;
+    const double tolerance_mm = BRep_Tool::Tolerance(edge);
+    if (deviation.mm <= tolerance_mm)
+        return;
+    use.state = PcurveState::Small;
+    if (deviation.mm <= resolution_mm)
+        return;
+    use.state = PcurveState::OffSurface;
+    if (deviation.along_mm <= kMuchNearer * deviation.mm)
+        return;
+    use.state = PcurveState::NotBettered;
+    Result<SplineCurve2d> projected =
+        gauge.projected(edge, pcurve, first, last, deviation.mm, 0.1 * std::max(tolerance_mm, resolution_mm));
+    if (!projected)
+        return;
+    const double projected_mm = gauge
+                                    .deviation(
+                                        edge, [&](double t) { return curve_point(*projected, t); }, first, last)
+                                    .mm;
+    if (!(projected_mm <= kMuchNearer * deviation.mm))
+        return;
+    use.pcurve = std::move(*projected);
+    use.first = first;
+    use.last = last;
+    use.deviation_mm = projected_mm;
+    use.file_deviation_mm = deviation.mm;
+    use.state = PcurveState::Rebuilt;
+}
+
 Result<CadEdgeUse> edge_use(const TopoDS_Edge& edge, const TopoDS_Face& face, const TopTools_IndexedMapOfShape& edges,
-                            const PcurveGauge& gauge, bool may_project)
+                            const PcurveGauge& gauge, bool may_project, double resolution_mm)
 {
     double first = 0, last = 0;
     Handle(Geom2d_Curve) curve = BRep_Tool::CurveOnSurface(edge, face, first, last);
@@ -114,13 +151,17 @@ Result<CadEdgeUse> edge_use(const TopoDS_Edge& edge, const TopoDS_Face& face, co
     if (!pcurve)
         return pcurve.error();
     CadEdgeUse use;
-    use.deviation_mm = gauge.deviation_mm(edge, curve, first, last);
     use.pcurve = pcurve->curve;
     use.first = pcurve->first;
     use.last = pcurve->last;
     use.reversed = edge.Orientation() == TopAbs_REVERSED;
     use.seam = BRep_Tool::IsClosed(edge, face);
     use.degenerate = BRep_Tool::Degenerated(edge);
+    const auto point = [&](double t) {
+        const gp_Pnt2d p = curve->Value(t);
+        return Vec2d{p.X(), p.Y()};
+    };
+    gauge_use(edge, gauge, point, first, last, resolution_mm, use);
     const int index = edges.FindIndex(edge);
     if (index == 0)
         return Error{ErrorCode::InvalidTrim, "edge", "it is not among its part's edges"};
@@ -187,7 +228,7 @@ Result<ConvertedPcurve> convert_pcurve(const Handle(Geom2d_Curve) & source, doub
 }
 
 Result<std::vector<CadLoop>> collect_loops(const TopoDS_Face& face, const TopTools_IndexedMapOfShape& edges,
-                                           bool may_project)
+                                           bool may_project, double resolution_mm)
 {
     std::vector<CadLoop> loops;
     const PcurveGauge gauge(face);
@@ -206,7 +247,7 @@ Result<std::vector<CadLoop>> collect_loops(const TopoDS_Face& face, const TopToo
         const bool complete = walked.size() == all.size();
         std::vector<CadEdgeUse> uses;
         for (const TopoDS_Edge& edge : complete ? walked : all) {
-            Result<CadEdgeUse> use = edge_use(edge, face, edges, gauge, may_project);
+            Result<CadEdgeUse> use = edge_use(edge, face, edges, gauge, may_project, resolution_mm);
             if (!use)
                 return use.error();
             uses.push_back(std::move(*use));

@@ -32,15 +32,26 @@ struct SplineCurve2d {
     std::vector<std::array<double, 3>> control_points;
 };
 
+/// What became of a pcurve that runs farther from its edge's curve than the edge's tolerance.
+enum class PcurveState : uint8_t {
+    WithinTolerance,
+    Rebuilt,     // replaced by the curve's projection onto the surface, which is much nearer
+    Small,       // kept: less than the pack resolves
+    OffSurface,  // kept: it is the curve that lies off the surface
+    NotBettered, // kept: no projection is much nearer
+};
+
 /// One use of an edge in a loop of a face: the pcurve is followed from `first` to `last`, or backwards if `reversed`.
 struct CadEdgeUse {
     SplineCurve2d pcurve;
     double first = 0, last = 0; // within the pcurve's knots
     bool reversed = false;
-    bool seam = false;                // the edge is used twice by this face, on a closed surface's seam
-    bool degenerate = false;          // a pole or apex: a line in uv that is one point in space
-    uint32_t edge = 0;                // index into CadPart::edges
-    double deviation_mm = 0;          // largest distance of the pcurve, on the surface, from the edge's curve in space
+    bool seam = false;            // the edge is used twice by this face, on a closed surface's seam
+    bool degenerate = false;      // a pole or apex: a line in uv that is one point in space
+    uint32_t edge = 0;            // index into CadPart::edges
+    double deviation_mm = 0;      // largest distance of the pcurve, on the surface, from the edge's curve in space
+    double file_deviation_mm = 0; // of the file's pcurve, where another took its place
+    PcurveState state = PcurveState::WithinTolerance;
     uint32_t edge_class = kEdgeSharp; // classify_edges
 };
 

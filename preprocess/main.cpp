@@ -187,17 +187,39 @@ Json dropped_json(const PackImage& image)
     return list;
 }
 
+const char* state_text(PcurveState state)
+{
+    switch (state) {
+    case PcurveState::WithinTolerance:
+        break;
+    case PcurveState::Rebuilt:
+        return "rebuilt";
+    case PcurveState::Small:
+        return "kept: less than the pack resolves";
+    case PcurveState::OffSurface:
+        return "kept: the edge's curve lies off the surface";
+    case PcurveState::NotBettered:
+        return "kept: no projection is much nearer";
+    }
+    return "within tolerance";
+}
+
 Json trims_json(const DeviationReport& deviations)
 {
     Json worst = Json::array();
-    for (const PcurveDeviation& d : deviations.worst)
+    for (const PcurveDeviation& d : deviations.worst) {
         worst.push_back({{"face", d.face_in_part},
                          {"part", d.part},
                          {"edge", d.edge},
                          {"deviation_mm", d.deviation_mm},
-                         {"tolerance_mm", d.tolerance_mm}});
+                         {"tolerance_mm", d.tolerance_mm},
+                         {"pcurve", state_text(d.state)}});
+        if (d.state == PcurveState::Rebuilt)
+            worst.back()["file_deviation_mm"] = d.file_deviation_mm;
+    }
     return {{"largest_pcurve_deviation_mm", deviations.largest_mm},
-            {"edge_uses_above_tolerance", deviations.above_tolerance},
+            {"pcurves_above_tolerance", deviations.above_tolerance},
+            {"pcurves_rebuilt", deviations.rebuilt},
             {"edges_above_tolerance", worst}};
 }
 
@@ -306,9 +328,9 @@ void print_table(const Json& report)
                     report["instances"].get<size_t>(), report["faces_instanced"].get<size_t>(),
                     report["patches"].get<size_t>(), report["leaves"].get<size_t>()));
     const Json& trims = report["trims"];
-    row("trims", fmt::format("pcurves within {:.3g} mm of their edges, {} beyond an edge's tolerance",
+    row("trims", fmt::format("pcurves within {:.3g} mm of their edges, {} beyond an edge's tolerance, {} rebuilt",
                              trims["largest_pcurve_deviation_mm"].get<double>(),
-                             trims["edge_uses_above_tolerance"].get<size_t>()));
+                             trims["pcurves_above_tolerance"].get<size_t>(), trims["pcurves_rebuilt"].get<size_t>()));
     std::string times;
     for (const auto& [phase, seconds] : report["seconds"].items())
         times += fmt::format("{}{} {:.2f}", times.empty() ? "" : ", ", phase, seconds.get<double>());

@@ -8,16 +8,19 @@
 
 namespace trimray {
 
-/// A pcurve that lies farther from its edge's curve than the edge's tolerance.
+/// A pcurve that lies, or lay in the file, farther from its edge's curve than the edge's tolerance.
 struct PcurveDeviation {
     uint32_t part = 0, face_in_part = 0;
     uint32_t edge = 0; // index into CadPart::edges
     double deviation_mm = 0, tolerance_mm = 0;
+    double file_deviation_mm = 0; // rebuilt: of the file's pcurve
+    PcurveState state = PcurveState::OffSurface;
 };
 
 struct DeviationReport {
     double largest_mm = 0;              // of all pcurves
     size_t above_tolerance = 0;         // how many there are
+    size_t rebuilt = 0;                 // of those
     std::vector<PcurveDeviation> worst; // of those, largest first, at most kMostDeviations
 };
 inline constexpr size_t kMostDeviations = 32;

@@ -11,16 +11,21 @@
 #include <BRepPrimAPI_MakeBox.hxx>
 #include <BRepPrimAPI_MakeCone.hxx>
 #include <BRepPrimAPI_MakeCylinder.hxx>
+#include <BRepPrimAPI_MakeHalfSpace.hxx>
 #include <BRepPrimAPI_MakePrism.hxx>
 #include <BRepPrimAPI_MakeSphere.hxx>
 #include <BRepTools.hxx>
 #include <BRep_Builder.hxx>
+#include <BRep_Tool.hxx>
 #include <Bnd_Box.hxx>
+#include <Geom2d_Curve.hxx>
 #include <GeomAPI_PointsToBSpline.hxx>
 #include <GeomAPI_PointsToBSplineSurface.hxx>
 #include <Geom_BSplineCurve.hxx>
 #include <Geom_BSplineSurface.hxx>
 #include <Geom_BezierCurve.hxx>
+#include <Geom_CylindricalSurface.hxx>
+#include <Geom_Ellipse.hxx>
 #include <Geom_OffsetSurface.hxx>
 #include <Geom_RectangularTrimmedSurface.hxx>
 #include <Geom_SurfaceOfLinearExtrusion.hxx>
@@ -255,6 +260,41 @@ bool write_solid(const std::string& name, const std::string& path)
             return write_shape(three_sheets(), path);
         if (name == "touching boxes")
             return write_shape(touching_boxes(), path);
+        return false;
+    } catch (const Standard_Failure&) {
+        return false;
+    }
+}
+
+bool write_slanted_cylinder(double shift_u, double growth_mm, const std::string& path)
+{
+    try {
+        const gp_Pln plane(gp_Ax3(gp_Pnt(0, 0, 5), gp_Dir(-0.5, 0, 1)));
+        const TopoDS_Shape above =
+            BRepPrimAPI_MakeHalfSpace(BRepBuilderAPI_MakeFace(plane, -50, 50, -50, 50).Face(), gp_Pnt(0, 0, 50))
+                .Solid();
+        const TopoDS_Shape solid = BRepAlgoAPI_Cut(BRepPrimAPI_MakeCylinder(5, 20).Shape(), above).Shape();
+        for (TopExp_Explorer f(solid, TopAbs_FACE); f.More(); f.Next()) {
+            const TopoDS_Face face = TopoDS::Face(f.Current().Oriented(TopAbs_FORWARD));
+            if (Handle(Geom_CylindricalSurface)::DownCast(BRep_Tool::Surface(face)).IsNull())
+                continue;
+            for (TopExp_Explorer e(face, TopAbs_EDGE); e.More(); e.Next()) {
+                const TopoDS_Edge edge = TopoDS::Edge(e.Current());
+                double first = 0, last = 0;
+                const auto rim = Handle(Geom_Ellipse)::DownCast(BRep_Tool::Curve(edge, first, last));
+                if (rim.IsNull())
+                    continue;
+                const auto moved =
+                    Handle(Geom2d_Curve)::DownCast(BRep_Tool::CurveOnSurface(edge, face, first, last)->Copy());
+                moved->Translate(gp_Vec2d(shift_u, 0));
+                const Handle(Geom_Ellipse) grown =
+                    new Geom_Ellipse(rim->Position(), rim->MajorRadius() + growth_mm, rim->MinorRadius() + growth_mm);
+                BRep_Builder builder;
+                builder.UpdateEdge(edge, moved, face, kFaceTolerance);
+                builder.UpdateEdge(edge, grown, kFaceTolerance);
+                return write_shape(solid, path);
+            }
+        }
         return false;
     } catch (const Standard_Failure&) {
         return false;

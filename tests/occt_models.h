@@ -34,4 +34,9 @@ bool write_scaled_neighbour(const std::string& from, const std::string& other, d
 ///   "touching boxes"  two boxes side by side in a compound, with nothing in common
 bool write_solid(const std::string& name, const std::string& path);
 
+/// A cylinder of radius 5 about z, from z = 0 up to the plane z = 5 + x / 2, whose rim (5 cos s, 5 sin s, 5 + 2.5 cos
+/// s) has been tampered with: its pcurve on the cylinder is moved by `shift_u` radians, and its curve in space is the
+/// ellipse with both half axes longer by `growth_mm`. False: not written.
+bool write_slanted_cylinder(double shift_u, double growth_mm, const std::string& path);
+
 } // namespace trimray::oracle
