@@ -18,9 +18,6 @@
 namespace trimray {
 namespace {
 
-// A frame of AOVs takes 53 bytes a pixel: the largest picture takes 14 GB.
-constexpr uint64_t kMaxPixels = uint64_t{1} << 28;
-
 struct RenderArguments {
     std::string pack, output, size = "1280x720", device = "auto", trim = "auto", closest = "certified", scene;
     std::string background = "transparent";
@@ -29,29 +26,6 @@ struct RenderArguments {
     double error_px = RenderOptions{}.error_px;
     bool json = false;
 };
-
-struct Size {
-    uint32_t width = 0, height = 0;
-};
-
-/// "WxH". Fails: Usage.
-Result<Size> parse_size(const std::string& text, uint32_t samples)
-{
-    Size size;
-    const char* const end = text.data() + text.size();
-    const auto width = std::from_chars(text.data(), end, size.width);
-    const bool has_x = width.ec == std::errc() && width.ptr != end && *width.ptr == 'x';
-    const auto height = has_x ? std::from_chars(width.ptr + 1, end, size.height) : width;
-    if (!has_x || height.ec != std::errc() || height.ptr != end || size.width == 0 || size.height == 0)
-        return Error{ErrorCode::Usage, "--size", fmt::format("expected WIDTHxHEIGHT in pixels, found '{}'", text)};
-    constexpr uint32_t kMaxSide = 65535; // samples times this stays below 2^32
-    if (size.width > kMaxSide || size.height > kMaxSide ||
-        uint64_t{size.width} * size.height * samples * samples > kMaxPixels)
-        return Error{ErrorCode::Usage, "--size",
-                     fmt::format("{} at {} samples is more than {} pixels, or wider than {}", text, samples * samples,
-                                 kMaxPixels, kMaxSide)};
-    return size;
-}
 
 /// "transparent", "white", "black" or "#rrggbb" (sRGB) as linear light; nothing for transparent. Fails: Usage.
 Result<std::optional<std::array<float, 3>>> parse_background(const std::string& text)
@@ -92,8 +66,8 @@ Status check(const RenderArguments& arguments)
     return Done{};
 }
 
-Json report_json(const RenderArguments& arguments, Size size, const PackImage& image, const RenderOptions& options,
-                 const RenderStats& stats)
+Json report_json(const RenderArguments& arguments, PictureSize size, const PackImage& image,
+                 const RenderOptions& options, const RenderStats& stats)
 {
     std::vector<double> ms = stats.frame_ms;
     std::sort(ms.begin(), ms.end());
@@ -127,7 +101,7 @@ int run_render(const RenderArguments& arguments)
 {
     if (const Status valid = check(arguments); !valid.ok())
         return report_error(valid.error());
-    const Result<Size> size = parse_size(arguments.size, arguments.samples);
+    const Result<PictureSize> size = parse_size(arguments.size, arguments.samples);
     if (!size.ok())
         return report_error(size.error());
     const auto background = parse_background(arguments.background);

@@ -11,11 +11,15 @@
 #include <algorithm>
 #include <array>
 #include <cassert>
+#include <charconv>
 #include <cmath>
 #include <limits>
 
 namespace trimray {
 namespace {
+
+// A frame of AOVs takes 53 bytes a pixel: the largest picture takes 14 GB.
+constexpr uint64_t kMaxPixels = uint64_t{1} << 28;
 
 Result<std::array<double, 3>> parse_vector(const std::string& option, const std::string& text)
 {
@@ -90,6 +94,24 @@ Result<std::unique_ptr<Tracer>> make_tracer(const std::shared_ptr<const Scene>& 
     if (cpu.ok())
         note = fmt::format("tracing on the CPU ({}): no hardware GPU: {}", (*cpu)->device_name(), gpu.error().detail);
     return cpu;
+}
+
+Result<PictureSize> parse_size(const std::string& text, uint32_t samples)
+{
+    PictureSize size;
+    const char* const end = text.data() + text.size();
+    const auto width = std::from_chars(text.data(), end, size.width);
+    const bool has_x = width.ec == std::errc() && width.ptr != end && *width.ptr == 'x';
+    const auto height = has_x ? std::from_chars(width.ptr + 1, end, size.height) : width;
+    if (!has_x || height.ec != std::errc() || height.ptr != end || size.width == 0 || size.height == 0)
+        return Error{ErrorCode::Usage, "--size", fmt::format("expected WIDTHxHEIGHT in pixels, found '{}'", text)};
+    constexpr uint32_t kMaxSide = 65535; // samples times this stays below 2^32
+    if (size.width > kMaxSide || size.height > kMaxSide ||
+        uint64_t{size.width} * size.height * samples * samples > kMaxPixels)
+        return Error{ErrorCode::Usage, "--size",
+                     fmt::format("{} at {} samples is more than {} pixels, or wider than {}", text, samples * samples,
+                                 kMaxPixels, kMaxSide)};
+    return size;
 }
 
 Result<Camera> camera_of(const ViewArguments& arguments, const PackImage& image, uint32_t width, uint32_t height)

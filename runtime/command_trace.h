@@ -32,6 +32,13 @@ TrimMode trim_mode(const std::string& name);
 Result<std::unique_ptr<Tracer>> make_tracer(const std::shared_ptr<const Scene>& scene, const std::string& device,
                                             std::string& note);
 
+struct PictureSize {
+    uint32_t width = 0, height = 0;
+};
+
+/// "WxH" in pixels, each of samples x samples rays. Fails: Usage.
+Result<PictureSize> parse_size(const std::string& text, uint32_t samples);
+
 /// Where the picture is taken from, as the command line says it.
 struct ViewArguments {
     std::string view = "iso", eye, target, up;

@@ -1,7 +1,7 @@
 // The CPU tracer against the surfaces themselves, evaluated in double, and against itself on every instruction set.
+#include "format/record_surface.h"
 #include "format/trim_query.h"
 #include "runtime/tracer.h"
-#include "tests/record_surface.h"
 #include "tests/traced_scenes.h"
 
 #include <gtest/gtest.h>
@@ -83,7 +83,7 @@ void surface_at(const PackImage& image, const Frame& frame, size_t pixel, Point&
         uv[i] = (at - patch.uv_offset[i]) / patch.uv_scale[i];
     }
     const auto part_mm = [&](double u, double v) {
-        const Point q = test::point_of(patch, image.control_points.data(), u, v);
+        const Point q = point_of(patch, image.control_points.data(), u, v);
         Point p;
         for (size_t c = 0; c < 3; ++c)
             p[c] = image.parts[0].scale_mm *

@@ -1,9 +1,9 @@
 // Leaves tile their patch, and their decoded boxes hold the surface.
 #include "format/derive.h"
 #include "format/leaf_geometry.h"
+#include "format/record_surface.h"
 #include "shaders/shared/leaf_box.h"
 #include "tests/random_pack.h"
-#include "tests/record_surface.h"
 
 #include <cmath>
 #include <cstring>
@@ -14,7 +14,6 @@
 namespace trimray {
 namespace {
 
-using test::point_of;
 using test::random_pack;
 using test::RandomSurfaces;
 

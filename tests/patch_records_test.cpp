@@ -1,15 +1,14 @@
 // Patch records are the surface they came from, and parameters read back from a point are the domain's.
+#include "format/record_surface.h"
 #include "preprocess/bezier_patch.h"
 #include "preprocess/vec3d.h"
 #include "tests/random_surfaces.h"
-#include "tests/record_surface.h"
 
 #include <gtest/gtest.h>
 
 namespace trimray {
 namespace {
 
-using test::point_of;
 using test::RandomSurfaces;
 
 constexpr double kPi = 3.14159265358979323846;

@@ -1,4 +1,5 @@
-// A patch record's surface from the single-precision numbers it holds, in double, straight from pack_layout.h.
+// A patch record's surface from the single-precision numbers it holds, in double, straight from pack_layout.h: for
+// tests and for measuring errors. Slow, and shares no code with the tracers.
 #pragma once
 
 #include "format/pack_layout.h"
@@ -7,7 +8,7 @@
 #include <cmath>
 #include <vector>
 
-namespace trimray::test {
+namespace trimray {
 
 /// S(u, v) of a record in patch units, from the single-precision numbers it holds, in double. uv_patch.
 inline std::array<double, 3> point_of(const PatchRecord& patch, const float* control_points, double u, double v)
@@ -51,4 +52,4 @@ inline std::array<double, 3> point_of(const PatchRecord& patch, const float* con
     return {sum[0] / sum[3], sum[1] / sum[3], sum[2] / sum[3]};
 }
 
-} // namespace trimray::test
+} // namespace trimray
