@@ -282,8 +282,11 @@ void run(const CadModel& model, const BuildOptions& options, PackImage& image, B
         for (size_t f = first_of_part[part]; f < first_of_part[part + 1]; ++f) {
             const bool converted = faces[f].dropped_reason.empty();
             face_ids[part].push_back(converted ? static_cast<uint>(image.faces.size()) : kNotConverted);
-            if (converted)
-                append_face(faces[f], image);
+            if (!converted)
+                continue;
+            append_face(faces[f], image);
+            for (const TrimFinding& finding : faces[f].trims.findings)
+                report.trim_findings.push_back({faces[f].part, faces[f].cad->face_in_part, finding});
         }
         record.face_count = static_cast<uint>(image.faces.size()) - record.first_face;
         record.patch_count = static_cast<uint>(image.patches.size()) - record.first_patch;

@@ -22,9 +22,16 @@ struct BuildOptions {
     int threads = 0; // 0: all
 };
 
+/// A finding of a face that was converted.
+struct FaceFinding {
+    uint32_t part = 0, face_in_part = 0;
+    TrimFinding finding;
+};
+
 struct BuildReport {
     uint32_t faces = 0, converted = 0;
     double convert_seconds = 0, trims_seconds = 0, bvh_seconds = 0, proxy_seconds = 0;
+    std::vector<FaceFinding> trim_findings; // by part and face
     std::vector<std::string> warnings;
 };
 

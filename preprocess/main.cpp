@@ -223,6 +223,30 @@ Json trims_json(const DeviationReport& deviations)
             {"edges_above_tolerance", worst}};
 }
 
+constexpr size_t kMostFindings = 1000; // in a report; beside them it says how many there are
+
+Json findings_json(const std::vector<FaceFinding>& findings)
+{
+    Json list = Json::array();
+    for (size_t i = 0; i < std::min(findings.size(), kMostFindings); ++i)
+        list.push_back({{"face", findings[i].face_in_part},
+                        {"part", findings[i].part},
+                        {"finding", finding_name(findings[i].finding.kind)},
+                        {"detail", finding_detail(findings[i].finding)}});
+    return list;
+}
+
+/// How many findings there are of each kind.
+Json finding_counts(const std::vector<FaceFinding>& findings)
+{
+    Json counts = Json::object();
+    for (const TrimFindingKind kind : {TrimFindingKind::OpenLoop, TrimFindingKind::TurnedLoop,
+                                       TrimFindingKind::TouchingLoops, TrimFindingKind::CrossingLoops})
+        counts[finding_name(kind)] = std::count_if(
+            findings.begin(), findings.end(), [&](const FaceFinding& found) { return found.finding.kind == kind; });
+    return counts;
+}
+
 /// The whole conversion; runs in the worker. Returns the report as JSON text.
 Result<std::string> convert(const Options& options, const SourceFile& source, const WorkerProgress& progress)
 {
@@ -294,6 +318,8 @@ Result<std::string> convert(const Options& options, const SourceFile& source, co
     json["patches"] = image.patches.size();
     json["leaves"] = image.leaves.size();
     json["trims"] = trims_json(gather_deviations(*model));
+    json["trims"]["findings"] = finding_counts(report.trim_findings);
+    json["trim_findings"] = findings_json(report.trim_findings);
     json["seconds"] = {
         {"read", model->read_seconds}, {"transfer", model->transfer_seconds}, {"faces", model->faces_seconds},
         {"mesh", model->mesh_seconds}, {"convert", report.convert_seconds},   {"trims", report.trims_seconds},
@@ -331,6 +357,12 @@ void print_table(const Json& report)
     row("trims", fmt::format("pcurves within {:.3g} mm of their edges, {} beyond an edge's tolerance, {} rebuilt",
                              trims["largest_pcurve_deviation_mm"].get<double>(),
                              trims["pcurves_above_tolerance"].get<size_t>(), trims["pcurves_rebuilt"].get<size_t>()));
+    std::string findings;
+    for (const auto& [name, count] : trims["findings"].items())
+        if (count.get<size_t>() > 0)
+            findings += fmt::format("{}{} ({})", findings.empty() ? "" : ", ", name, count.get<size_t>());
+    if (!findings.empty())
+        row("", findings + "; --json names the faces");
     std::string times;
     for (const auto& [phase, seconds] : report["seconds"].items())
         times += fmt::format("{}{} {:.2f}", times.empty() ? "" : ", ", phase, seconds.get<double>());

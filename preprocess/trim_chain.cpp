@@ -179,8 +179,10 @@ bool join(CurvePiece& before, CurvePiece& after, Vec2d offset, const CadFace& fa
     report.largest_gap_mm = std::max(report.largest_gap_mm, gap_mm);
     if (flat_mm > kJoinTolerances * metric.tolerance_mm) {
         filler = line_piece(a, b);
-        if (gap_mm > std::max(face.tolerance_mm, kJoinTolerances * metric.tolerance_mm))
+        if (gap_mm > std::max(face.tolerance_mm, kJoinTolerances * metric.tolerance_mm)) {
             report.had_open_loop = true;
+            report.findings.push_back({TrimFindingKind::OpenLoop, a, gap_mm, report.loop, report.loop});
+        }
         return true;
     }
     report.largest_move_mm = std::max(report.largest_move_mm, 0.5 * flat_mm);
@@ -348,6 +350,7 @@ std::vector<TrimChain> build_chains(const CadFace& face, double relative_toleran
     std::vector<TrimChain> chains;
     for (const Walk& walk : walks) {
         TrimChain chain;
+        chain.loop = report.loop = static_cast<int>(chains.size());
         for (const PlacedUse& placed : walk) {
             const CadEdgeUse& e = *placed.use.edge;
             CurveFit fit = fit_curve(e.pcurve, e.first, e.last, metric.mm_per_uv, metric.tolerance_mm);

@@ -2,7 +2,7 @@
 // gaps, poles and loops that go once around are closed.
 #pragma once
 
-#include "preprocess/trim_curve.h"
+#include "preprocess/trim_check.h"
 
 #include <string>
 #include <vector>
@@ -20,9 +20,12 @@ struct TrimMetric {
 struct TrimChain {
     std::vector<CurvePiece> pieces;
     int winding_u = 0, winding_v = 0;
+    int loop = -1; // number of the face's loop, as walked; negative: made of several, or of none
 };
 
 struct ChainReport {
+    std::vector<TrimFinding> findings; // open loops, and loops around a surface in the wrong direction
+    int loop = 0;                      // number of the loop at work
     bool had_open_loop = false;
     double largest_gap_mm = 0;
     double largest_deviation_mm = 0; // of the fit

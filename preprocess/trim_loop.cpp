@@ -258,6 +258,11 @@ Result<TrimLoops> build_trim_loops(const CadFace& face, const TrimOptions& optio
         merged_mm = std::max(merged_mm, merge_lines(chain.pieces, class_of, mm_per_face, 0.1 * metric.tolerance_mm));
         append_loop(chain.pieces, class_of, loops);
     }
+    std::vector<CheckedLoop> checked;
+    for (const TrimChain& chain : chains)
+        checked.push_back({&chain.pieces, chain.loop});
+    loops.findings = std::move(report.findings);
+    check_loops(checked, face, loops.domain, loops.findings);
     std::vector<MonotonePiece> pieces;
     for (const uint32_t word : loops.pieces)
         pieces.push_back(load_piece(loops.points.data(), 0, word));

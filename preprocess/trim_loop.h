@@ -2,7 +2,7 @@
 #pragma once
 
 #include "format/result.h"
-#include "preprocess/cad_model.h"
+#include "preprocess/trim_check.h"
 
 #include <cstdint>
 #include <string>
@@ -26,6 +26,7 @@ struct TrimLoops {
     bool had_open_loop = false;   // a gap above the tolerance was closed by a segment
     double largest_gap = 0;       // closed gap, relative to the domain
     double largest_deviation = 0; // of the simplification, relative to the domain
+    std::vector<TrimFinding> findings;
 };
 
 /// Fails: InvalidTrim with the reason (no area, not finite, ...).

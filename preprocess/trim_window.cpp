@@ -159,6 +159,8 @@ void join_winding(std::vector<TrimChain>& chains, const CadSurface& surface, Axi
         Pieces& pieces = winding.front().pieces;
         report.largest_gap_mm = std::max(report.largest_gap_mm, period * axis.scale(metric));
         report.had_open_loop = true;
+        report.findings.push_back({TrimFindingKind::OpenLoop, pieces.back().p[3], period * axis.scale(metric),
+                                   winding.front().loop, winding.front().loop});
         pieces.push_back(line_piece(pieces.back().p[3], pieces.front().p[0]));
         closed.push_back(std::move(winding.front()));
         winding.clear();
@@ -173,12 +175,13 @@ void join_winding(std::vector<TrimChain>& chains, const CadSurface& surface, Axi
         Pieces pieces;
         bool forwards; // with the axis: in a right-handed uv, the face lies on the upper side (u) or lower side (v)
         double at_border;
+        int loop; // negative: a pole's
     };
     std::vector<Band> bands;
     for (TrimChain& chain : winding) {
         const int turns = axis.winding(chain);
         start_at(chain.pieces, axis, start, period, turns);
-        Band band{std::move(chain.pieces), turns > 0, 0};
+        Band band{std::move(chain.pieces), turns > 0, 0, chain.loop};
         if (!band.forwards)
             reverse_pieces(band.pieces);
         band.pieces.front().p[0] = axis.point(start, axis.across(band.pieces.front().p[0]));
@@ -215,10 +218,14 @@ void join_winding(std::vector<TrimChain>& chains, const CadSurface& surface, Axi
             report.failure = "an odd number of loops goes around a surface that has no end on either side";
             return;
         }
-        Band pole{{line_piece(axis.point(start, border), axis.point(start + period, border))}, true, border};
+        Band pole{{line_piece(axis.point(start, border), axis.point(start + period, border))}, true, border, -1};
         bands.insert(border > bands.back().at_border ? bands.end() : bands.begin(), std::move(pole));
     }
     for (size_t i = 0; i + 1 < bands.size(); i += 2) {
+        for (const size_t k : {i, i + 1}) // the face lies above the lower and below the upper loop of a pair
+            if (bands[k].loop >= 0 && upper_side(bands[k]) != (k == i))
+                report.findings.push_back(
+                    {TrimFindingKind::TurnedLoop, bands[k].pieces.front().p[0], 0, bands[k].loop, bands[k].loop});
         TrimChain loop;
         loop.pieces = std::move(bands[i].pieces);
         Pieces& back = bands[i + 1].pieces;

@@ -1,6 +1,7 @@
 // Pcurves to loops of monotone pieces: the same region within the tolerance, few pieces, shared ends, seams.
 #include "preprocess/trim_loop.h"
 
+#include "tests/cad_faces.h"
 #include "tests/trim_shapes.h"
 
 #include <gmock/gmock.h>
@@ -10,61 +11,6 @@ namespace trimray {
 namespace {
 
 using namespace shapes;
-
-SplineCurve2d line_curve(Vec2d a, Vec2d b)
-{
-    return {1, false, {0, 0, 1, 1}, {{a.x, a.y, 1}, {b.x, b.y, 1}}};
-}
-
-CadEdgeUse use_of(SplineCurve2d curve, bool reversed = false)
-{
-    CadEdgeUse use;
-    use.first = curve.knots[curve.degree];
-    use.last = curve.knots[curve.control_points.size()];
-    use.pcurve = std::move(curve);
-    use.reversed = reversed;
-    return use;
-}
-
-CadLoop polygon_loop(const std::vector<Vec2d>& corners)
-{
-    CadLoop loop;
-    for (size_t i = 0; i < corners.size(); ++i)
-        loop.push_back(use_of(line_curve(corners[i], corners[(i + 1) % corners.size()])));
-    return loop;
-}
-
-/// A full circle as the kernel writes it: a rational quadratic of four quadrants.
-SplineCurve2d circle_curve(Vec2d c, double r, bool clockwise = false)
-{
-    const double h = std::sqrt(0.5);
-    const double x[9] = {1, 1, 0, -1, -1, -1, 0, 1, 1}, y[9] = {0, 1, 1, 1, 0, -1, -1, -1, 0};
-    SplineCurve2d curve{2, true, {0, 0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 4}, {}};
-    for (int i = 0; i < 9; ++i) {
-        const double w = i % 2 == 0 ? 1 : h;
-        curve.control_points.push_back({w * (c.x + r * x[i]), w * (c.y + (clockwise ? -r : r) * y[i]), w});
-    }
-    return curve;
-}
-
-CadFace plane_face(std::vector<CadLoop> loops)
-{
-    CadFace face;
-    face.surface.kind = kKindPlane;
-    face.surface.natural_bounds = {{-1e100, -1e100}, {1e100, 1e100}};
-    face.loops = std::move(loops);
-    return face;
-}
-
-CadFace cylinder_face(double radius, std::vector<CadLoop> loops)
-{
-    CadFace face = plane_face(std::move(loops));
-    face.surface.kind = kKindCylinder;
-    face.surface.radius = radius;
-    face.surface.period_u = 2 * M_PI;
-    face.surface.natural_bounds = {{0, -1e100}, {2 * M_PI, 1e100}};
-    return face;
-}
 
 std::vector<MonotonePiece> pieces_of(const TrimLoops& loops)
 {
@@ -442,11 +388,8 @@ TEST(trim_loop, every_orientation_of_nested_loops_is_the_same_region)
                                       {use_of(circle_curve({5, 5}, 4))},
                                       {use_of(circle_curve({5, 5}, 2))}};
         for (int i = 0; i < 3; ++i)
-            if ((mask >> i & 1) != 0) {
-                std::reverse(loops[static_cast<size_t>(i)].begin(), loops[static_cast<size_t>(i)].end());
-                for (CadEdgeUse& use : loops[static_cast<size_t>(i)])
-                    use.reversed = !use.reversed;
-            }
+            if ((mask >> i & 1) != 0)
+                loops[static_cast<size_t>(i)] = turned(loops[static_cast<size_t>(i)]);
         const auto built = build_trim_loops(plane_face(loops), {});
         ASSERT_TRUE(built.ok());
         expect_sound(*built);

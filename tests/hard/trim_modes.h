@@ -43,12 +43,15 @@ inline constexpr std::array<TrimWay, 8> kTrimWays{{{"cpu exact", false, TrimMode
 struct TrimmedPlane {
     std::shared_ptr<const Scene> scene;
     std::vector<MonotonePiece> pieces;
+    std::function<bool(double u, double v)> truth; // what is inside, where that is not what the pieces say
 
     const FaceRecord& face() const { return scene->pack.image.faces[0]; }
     bool inside(double u, double v) const
     {
         if (u < 0 || u > 1 || v < 0 || v > 1)
             return false;
+        if (truth)
+            return truth(u, v);
         return (face().flags & kFaceNaturalBorder) != 0 || shapes::exact_inside(pieces, u, v);
     }
 };
