@@ -29,9 +29,9 @@ FN scalar fetch_control(FETCH_PARAM uint index)
 {
     return source.control_points[index];
 }
-FN integer fetch_cell(FETCH_PARAM integer index)
+FN uint fetch_cell(FETCH_PARAM uint index)
 {
-    return gather(source.cells, index);
+    return source.cells[index];
 }
 FN uint fetch_entry_word(FETCH_PARAM uint index)
 {

@@ -72,7 +72,7 @@ bool inside_trims(FaceRecord face, vec2 uv)
     if (trim_mode == kTrimByTexture)
         return sdf_distance(trim, uv) > 0.0f;
     // the cell's class takes one fetch and decides most; the texture's four come before the pieces
-    uint word = cell_word(trim, uv);
+    uint word = fetch_cell(cell_index(trim, uv));
     bool inside = cell_says_inside(word);
     if (!cell_is_mixed(word))
         return inside;

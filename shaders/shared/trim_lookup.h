@@ -12,8 +12,8 @@
 
 SHARED_OPEN
 
-// Data comes through fetch_cell and fetch_sdf_word, a lane each, and fetch_entry_word, fetch_entry_eta and
-// fetch_trim_point (index in points), the same for all lanes: a cell's pieces are asked for the lanes in that cell.
+// Data comes through fetch_sdf_word, a lane each, and fetch_cell, fetch_entry_word, fetch_entry_eta and
+// fetch_trim_point (index in points), the same for all lanes: a cell is asked for the lanes in it.
 
 // The constants of one face
 struct TrimFace {
@@ -41,22 +41,22 @@ FN TrimFace trim_face(FaceRecord face)
     return trim;
 }
 
-// The cell's word at uv_face, which must lie in [0, kUvBelowOne]^2
-FN integer cell_word(FETCH_PARAM TrimFace face, real2 uv)
+// The cell at uv_face, which must lie in [0, kUvBelowOne]^2
+FN integer cell_index(TrimFace face, real2 uv)
 {
     PRECISE real column = uv.x * scalar(face.columns);
     PRECISE real row = uv.y * scalar(face.rows);
     integer i = min(to_integer(column), integer(face.columns - 1u));
     integer j = min(to_integer(row), integer(face.rows - 1u));
-    return fetch_cell(FETCH_PASS integer(face.first_cell) + j * integer(face.columns) + i);
+    return integer(face.first_cell) + j * integer(face.columns) + i;
 }
-FN mask cell_is_mixed(integer word)
+FN bool cell_is_mixed(uint word)
 {
-    return (word & integer(kCellMixedCornerOut)) != integer(0u);
+    return (word & kCellMixedCornerOut) != 0u;
 }
-FN mask cell_says_inside(integer word)
+FN bool cell_says_inside(uint word)
 {
-    return (word & integer(1u)) != integer(0u);
+    return (word & 1u) != 0u;
 }
 FN uint cell_first_entry(TrimFace face, uint word)
 {
@@ -68,10 +68,10 @@ FN bool entry_is_last(uint word)
 }
 
 // u < P(v) for the monotone cubic with control points a, b, c, d, a.y < d.y, of the lanes `asked`, whose uv lies
-// between the ends' v and strictly between their u. On the curve, f(t) = (V(t) - v) / dv + (U(t) - u) / du grows from
-// f(0) <= 0 to f(1) >= 0, and near its root U(t) - u and V(t) - v have opposite effect: then, whatever is left of f,
-// the curve is known to pass on one side of uv. Newton on f, kept in its bracket, gets there in a step or two; to the
-// end it goes only where uv lies on the curve. Bernstein form of the distances from uv, so that ends are exact.
+// between the ends' u and v. Along the curve f(t) = ((V(t) - v) / dv + (U(t) - u) / du) / 2 grows from f(0) <= 0 to
+// f(1) >= 0. Near its root the two terms have opposite signs, and wherever they have, the curve passes uv on a known
+// side: one or two of Newton's steps get there, more only where uv lies on the curve. They are kept in their bracket.
+// Bernstein form of the distances from uv, so that ends are exact.
 FN_LARGE mask left_of_cubic(scalar2 a, scalar2 b, scalar2 c, scalar2 d, real2 uv, mask asked)
 {
     bool u_grows = a.x < d.x;
