@@ -1,8 +1,10 @@
+#include "runtime/command_draw.h"
 #include "runtime/command_json.h"
 #include "runtime/command_report.h"
 #include "runtime/command_trace.h"
 #include "runtime/commands.h"
 #include "runtime/effect_plan.h"
+#include "runtime/frame_effects.h"
 #include "runtime/image_io.h"
 #include "runtime/trim_mode.h"
 
@@ -22,28 +24,11 @@ struct RenderArguments {
     std::string pack, output, size = "1280x720", device = "auto", trim = "auto", closest = "certified", scene;
     std::string background = "transparent";
     ViewArguments view;
+    DrawArguments draw;
     uint32_t frames = 1, threads = 0, samples = 1;
     double error_px = RenderOptions{}.error_px;
     bool json = false;
 };
-
-/// "transparent", "white", "black" or "#rrggbb" (sRGB) as linear light; nothing for transparent. Fails: Usage.
-Result<std::optional<std::array<float, 3>>> parse_background(const std::string& text)
-{
-    if (text == "transparent")
-        return std::optional<std::array<float, 3>>();
-    const std::string hex = text == "white" ? "#ffffff" : text == "black" ? "#000000" : text;
-    uint32_t rgb = 0;
-    const char* const end = hex.data() + hex.size();
-    if (hex.size() == 7 && hex[0] == '#')
-        if (const auto parsed = std::from_chars(hex.data() + 1, end, rgb, 16);
-            parsed.ec == std::errc() && parsed.ptr == end)
-            return std::optional(std::array<float, 3>{srgb_to_linear(static_cast<float>(rgb >> 16) / 255.0f),
-                                                      srgb_to_linear(static_cast<float>(rgb >> 8 & 0xff) / 255.0f),
-                                                      srgb_to_linear(static_cast<float>(rgb & 0xff) / 255.0f)});
-    return Error{ErrorCode::Usage, "--background",
-                 fmt::format("expected transparent, white, black or #rrggbb, found '{}'", text)};
-}
 
 /// Faults of the arguments that need no file to be seen.
 Status check(const RenderArguments& arguments)
@@ -60,6 +45,11 @@ Status check(const RenderArguments& arguments)
         return named;
     if (arguments.samples > 1 && !arguments.output.ends_with(".png"))
         return Error{ErrorCode::Usage, "--samples", "averages colours only: an EXR has one sample a pixel"};
+    if (arguments.samples > 1 && arguments.draw.edge_width_px * arguments.samples > double(kLargestEdgeWidthPx))
+        return Error{ErrorCode::Usage, "--edge-width",
+                     fmt::format("{} pixels of {} x {} samples are more than {} samples across",
+                                 arguments.draw.edge_width_px, arguments.samples, arguments.samples,
+                                 kLargestEdgeWidthPx)};
     if (!(arguments.error_px > 0 && arguments.error_px <= 1))
         return Error{ErrorCode::Usage, "--error-px",
                      fmt::format("expected a part of a pixel in (0, 1], found {}", arguments.error_px)};
@@ -94,6 +84,8 @@ Json report_json(const RenderArguments& arguments, PictureSize size, const PackI
     report["work"] = {{"leaf_visits", static_cast<double>(work.leaf_visits) / rays},
                       {"newton_steps", static_cast<double>(work.newton_steps) / rays},
                       {"curve_tests", static_cast<double>(work.curve_tests) / rays}};
+    if (edge_query(options).any())
+        report["work"]["edge_tests"] = static_cast<double>(work.edge_tests) / rays;
     return report;
 }
 
@@ -104,9 +96,13 @@ int run_render(const RenderArguments& arguments)
     const Result<PictureSize> size = parse_size(arguments.size, arguments.samples);
     if (!size.ok())
         return report_error(size.error());
-    const auto background = parse_background(arguments.background);
+    const auto background = parse_color("--background", arguments.background, "transparent");
     if (!background.ok())
         return report_error(background.error());
+
+    RenderOptions options;
+    if (const Status drawn = set_drawing(arguments.draw, options); !drawn.ok())
+        return report_error(drawn.error());
 
     const Result<std::shared_ptr<const Scene>> scene = load_scene(arguments.pack);
     if (!scene.ok())
@@ -124,7 +120,6 @@ int run_render(const RenderArguments& arguments)
     if (!note.empty())
         report_note(note);
 
-    RenderOptions options;
     options.width = size->width;
     options.height = size->height;
     options.camera = *camera;
@@ -177,6 +172,7 @@ void register_render(CLI::App& app, int& exit_code)
         ->capture_default_str()
         ->check(CLI::Range(1u, 16u));
     command->add_option("--background", a->background, "transparent, white, black or #rrggbb")->capture_default_str();
+    add_draw_options(*command, a->draw);
     command->add_option("--scene", a->scene, "A scene file (not in this version)");
     command->add_flag("--json", a->json, "Print one JSON object: device, times, bytes, effects, work per ray");
     command->footer("Camera: pinhole, pixel centres at +0.5, row 0 at the top. Without --eye the model is framed whole "
@@ -184,6 +180,8 @@ void register_render(CLI::App& app, int& exit_code)
                     "  trimray render model.tray -o picture.png\n"
                     "  trimray render model.tray -o picture.png --view front --samples 3 --background white\n"
                     "  trimray render model.tray -o hits.exr --size 1920x1080 --eye 100,-200,80 --target 0,0,10\n"
+                    "  trimray render model.tray -o picture.png --edges sharp --silhouettes --antialias trims\n"
+                    "  trimray render model.tray -o drawing.png --style edges-only --edge-width 2 --background white\n"
                     "  trimray render model.tray -o picture.png --device cpu --frames 20 --json");
     command->callback([a, &exit_code] { exit_code = run_render(*a); });
 }

@@ -164,6 +164,7 @@ Result<Frame> trace_picture(Tracer& tracer, RenderOptions options, uint32_t samp
 {
     options.width *= samples;
     options.height *= samples;
+    options.edge_width_px *= static_cast<float>(samples);
     Result<Frame> frame = tracer.render(options, stats);
     if (!frame.ok() || samples == 1)
         return frame;

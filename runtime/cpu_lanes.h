@@ -2,7 +2,9 @@
 #pragma once
 
 #include "format/trim_reference.h"
+#include "runtime/border_cells.h"
 #include "runtime/cpu_view.h"
+#include "runtime/frame_effects.h"
 #include "runtime/tracer.h"
 
 #include <cstdint>
@@ -31,6 +33,12 @@ struct Strip {
     alignas(64) uint8_t certified[kTileSide][kBlockSide];
 };
 
+/// A patch as the rays of a view see it.
+struct EdgeView {
+    uint32_t patch = ~0u, instance = ~0u;
+    PatchView view{};
+};
+
 /// What a block's tracing reads and writes; one a thread, reused.
 struct BlockScratch {
     CandidateScratch walk;
@@ -42,6 +50,14 @@ struct BlockScratch {
     std::vector<uint32_t> index;
     Strip strip;
     std::vector<TrimQueries> trim_queries; // of all blocks so far, where the job records them
+    std::vector<EdgeView> edge_views;
+};
+
+/// Borders are asked for: how far, among what, and where to note them.
+struct EdgeJob {
+    EdgeQuery query;
+    const BorderCells& cells;
+    EdgeMap& map;
 };
 
 struct BlockJob {
@@ -53,6 +69,7 @@ struct BlockJob {
     float error_px;
     const TrimReference* reference = nullptr; // TrimMode::Reference has one
     bool record_trim_queries = false;
+    const EdgeJob* edges = nullptr; // null: nobody asks for borders
 };
 
 /// Traces the block into `frame`, whose arrays have their size.

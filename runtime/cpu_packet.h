@@ -9,6 +9,7 @@
 #define TRIMRAY_CPU_PACKET_H
 #endif
 
+#include "runtime/cpu_edges.h"
 #include "runtime/cpu_evaluate.h"
 #include "runtime/cpu_fetch.h"
 #include "runtime/cpu_lanes.h"
@@ -36,7 +37,7 @@ class BlockTracer {
 public:
     BlockTracer(const BlockJob& job, BlockScratch& scratch, Frame& frame, WorkCounts& work)
         : job_(job), scratch_(scratch), frame_(frame), work_(work), image_(job.scene.image),
-          source_(fetch_source(job.scene.image))
+          source_(fetch_source(job.scene.image)), edges_(job, scratch, source_, work)
     {
     }
 
@@ -64,6 +65,8 @@ public:
                         packet.alive = packet.x < float(tile.x1) - middle_x && packet.y < float(tile.y1) - middle_y;
                         const PacketHit hit = trace_packet(packet, pixel_rect({x, y, x + 4, y + 4}));
                         write_packet(job_, packet, hit, x - block.x0, y - ty, scratch_.strip, work_);
+                        if (job_.edges)
+                            edges_.find(packet, hit, x, y);
                     }
                 }
             }
@@ -382,6 +385,7 @@ private:
     WorkCounts& work_;
     const PackImage& image_;
     const FetchSource source_;
+    EdgeFinder edges_;
     size_t tile_count_ = 0;
     uint64_t recent_[8];
     uint recent_count_ = 0;

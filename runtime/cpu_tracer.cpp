@@ -1,10 +1,13 @@
 #include "runtime/cpu_lanes.h"
+#include "runtime/frame_effects.h"
 #include "runtime/tracer.h"
 #include "runtime/trim_mode.h"
 
 #include <algorithm>
 #include <chrono>
+#include <functional>
 #include <limits>
+#include <optional>
 #include <utility>
 
 #include <fmt/format.h>
@@ -39,6 +42,7 @@ void add(WorkCounts& sum, const WorkCounts& part)
     sum.newton_steps += part.newton_steps;
     sum.curve_tests += part.curve_tests;
     sum.uncertified_pixels += part.uncertified_pixels;
+    sum.edge_tests += part.edge_tests;
 }
 
 /// The scene's own, or a new one.
@@ -68,6 +72,10 @@ public:
         const Result<TrimMode> trim = choose_trim(scene_->pack.image, options.trim);
         if (!trim.ok())
             return trim.error();
+        if (const Status drawable = check_effects(options); !drawable.ok())
+            return drawable.error();
+        if (edge_query(options).any() && has_effects(options) && !border_cells_)
+            border_cells_ = make_border_cells(scene_->pack.image);
         stats.device = name_;
         stats.trim = *trim;
         stats.frame_ms.clear();
@@ -100,6 +108,15 @@ private:
             job.reference = reference_.get();
             job.record_trim_queries = options.record_trim_queries;
         }
+        const bool effects = has_effects(options);
+        std::optional<EdgeJob> edges;
+        if (effects) {
+            const EdgeQuery query = edge_query(options);
+            edge_map_.resize(options.width, options.height, query);
+            if (query.any())
+                edges.emplace(EdgeJob{query, *border_cells_, edge_map_});
+        }
+        job.edges = edges ? &*edges : nullptr;
         const uint32_t columns = (options.width + kBlockSide - 1) / kBlockSide,
                        rows = (options.height + kBlockSide - 1) / kBlockSide;
         tbb::enumerable_thread_specific<WorkCounts> counts;
@@ -108,12 +125,16 @@ private:
             const Block block{x, y, std::min(x + kBlockSide, options.width), std::min(y + kBlockSide, options.height)};
             trace_block_(job, block, scratch_.local(), frame, counts.local());
         };
-        if (threads == 1) {
-            for (uint32_t i = 0; i < columns * rows; ++i)
-                trace_one(i);
-        } else {
-            arena.execute([&] { tbb::parallel_for(0u, columns * rows, trace_one); });
-        }
+        const auto run_each = [&](uint32_t count, const std::function<void(uint32_t)>& body) {
+            if (threads == 1)
+                for (uint32_t i = 0; i < count; ++i)
+                    body(i);
+            else
+                arena.execute([&] { tbb::parallel_for(0u, count, body); });
+        };
+        run_each(columns * rows, trace_one);
+        if (effects)
+            draw_effects(scene_->pack.image, options, run_each, edge_map_, frame);
         WorkCounts sum;
         for (const WorkCounts& some : counts)
             add(sum, some);
@@ -136,6 +157,8 @@ private:
     std::string name_;
     std::unique_ptr<const TrimReference> reference_; // made when first asked for
     tbb::enumerable_thread_specific<BlockScratch> scratch_;
+    std::optional<BorderCells> border_cells_; // once a picture asks for borders
+    EdgeMap edge_map_;
 };
 
 } // namespace

@@ -100,6 +100,37 @@ void add_colors(const PackImage& image, std::vector<EffectItem>& plan)
         plan.push_back({"instance-colors", counted(placements, "placement has a colour", "placements have colours")});
 }
 
+/// Pieces of trims and sides of natural borders, by class.
+std::array<size_t, kEdgeClassCount> edges_by_class(const PackImage& image)
+{
+    std::array<size_t, kEdgeClassCount> counts{};
+    for (const uint word : image.trim_pieces)
+        ++counts[word >> kPieceClassShift & 3u];
+    for (const FaceRecord& face : image.faces)
+        if ((face.flags & kFaceNaturalBorder) != 0)
+            for (uint side = 0; side < 4; ++side)
+                ++counts[face.border_classes >> 2 * side & 3u];
+    return counts;
+}
+
+// Lines and blended borders are passes over the frame: their names say what the pass reads.
+void add_drawing(const PackImage& image, const RenderOptions& options, std::vector<EffectItem>& plan)
+{
+    const std::array<size_t, kEdgeClassCount> edges = edges_by_class(image);
+    if (options.edges != EdgeLines::None)
+        plan.push_back({"edges", fmt::format("asked for: {} where faces meet at an angle, {} where one ends",
+                                             counted(edges[kEdgeSharp], "piece", "pieces"), edges[kEdgeFree])});
+    if (options.edges == EdgeLines::All)
+        plan.push_back({"edges-smooth", fmt::format("asked for: {} where faces meet smoothly",
+                                                    counted(edges[kEdgeSmooth], "piece", "pieces"))});
+    if (options.silhouettes)
+        plan.push_back({"silhouettes", "asked for: lines where surfaces turn away or hide what lies behind"});
+    if (options.antialias_trims)
+        plan.push_back({"trim-antialiasing", "asked for: borders and rims blended at one sample a pixel"});
+    if (!options.fill)
+        plan.push_back({"unfilled-faces", "asked for: faces show the background"});
+}
+
 } // namespace
 
 std::array<uint32_t, kSurfaceKindCount> faces_by_kind(const PackImage& image)
@@ -129,8 +160,10 @@ std::vector<EffectItem> effect_plan(const PackImage& image, const RenderOptions&
     if (flagged > 0)
         plan.push_back({"many-starts", fmt::format("{} not certified to hold one hit a ray, of {}",
                                                    counted(flagged, "leaf is", "leaves are"), image.leaves.size())});
-    if (options.shade)
+    if (options.shade) {
         plan.push_back({"shading", "the picture is asked for, not hits alone"});
+        add_drawing(image, options, plan);
+    }
     return plan;
 }
 

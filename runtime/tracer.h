@@ -8,6 +8,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -38,6 +39,14 @@ struct TrimQueries {
     uint32_t inside; // the reference's answers, in the lanes asked
 };
 
+/// Which borders of faces are drawn as lines. Seams and poles, where nothing ends, never are.
+enum class EdgeLines {
+    None,
+    Sharp, // where faces meet at an angle, or a face ends
+    All,   // where faces meet smoothly too
+};
+constexpr float kLargestEdgeWidthPx = 60;
+
 struct RenderOptions {
     uint32_t width = 1280, height = 720;
     Camera camera;
@@ -47,6 +56,15 @@ struct RenderOptions {
     float error_px = 0.02f;           // stop of Newton's iteration, in pixels
     bool shade = true;                // fill rgba
     bool record_trim_queries = false; // with TrimMode::Reference: fill RenderStats::trim_queries
+
+    // What is drawn over the surfaces: rgba alone changes, and only where it is asked for. Needs shade.
+    EdgeLines edges = EdgeLines::None;
+    bool silhouettes = false;   // lines where a surface turns away, and where a border hides what lies behind it
+    bool fill = true;           // false: faces hide what is behind them, but show the background
+    float edge_width_px = 1.5f; // of lines, in (0, kLargestEdgeWidthPx], at every slant
+    // linear light; none: nearly black on light faces, light on dark ones
+    std::optional<std::array<float, 3>> edge_color;
+    bool antialias_trims = false; // borders and rims of faces blended with what is beside them, from one sample a pixel
 };
 
 /// Per-pixel results, row 0 at the top. A miss has depth +inf, face -1, zeros elsewhere.
@@ -65,6 +83,7 @@ struct Frame {
 /// compare them before times.
 struct WorkCounts {
     uint64_t rays = 0, node_visits = 0, leaf_visits = 0, newton_steps = 0, curve_tests = 0, uncertified_pixels = 0;
+    uint64_t edge_tests = 0; // pieces of borders measured, a ray each
 };
 
 struct RenderStats {

@@ -1,5 +1,7 @@
 #include "runtime/vk_scene.h"
 
+#include "runtime/frame_effects.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -196,6 +198,11 @@ Result<FrameSetup> frame_setup(const PackImage& image, const RenderOptions& opti
     view.width = options.width;
     view.height = options.height;
     view.error_px = options.error_px;
+    const EdgeQuery query = edge_query(options);
+    view.line_width_px = query.line_width_px;
+    view.line_reach_px = query.line_reach_px;
+    view.border_reach_px = query.border_reach_px;
+    view.line_classes = query.line_classes;
     view.tau_ref = nearest_tau(image, rays.eye, setup.w0);
 
     setup.instances.resize(std::max<size_t>(image.instances.size(), 1));

@@ -1,5 +1,7 @@
 // The Vulkan tracer: uploads a scene once, then traces each frame in bands of rows, one dispatch of primary.comp a
 // band, and reads the last frame's pixels back.
+#include "runtime/border_cells.h"
+#include "runtime/frame_effects.h"
 #include "runtime/tracer.h"
 #include "runtime/trim_mode.h"
 #include "runtime/vk_buffer.h"
@@ -8,11 +10,14 @@
 #include "runtime/vk_scene.h"
 
 #include <fmt/format.h>
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <array>
 #include <chrono>
 #include <cstring>
+#include <functional>
 #include <limits>
 #include <utility>
 
@@ -28,8 +33,9 @@ const uint32_t kPrimarySpirv[] =
 constexpr size_t kBandBytes = size_t{32} << 20;
 
 // The software driver ends an invocation's loops in silence after 65,535 iterations. walk() looks at its count after
-// each round, which takes at most 20,000 (kRoundIterations in leaf_hit.glsl); shading takes another 3,400.
-constexpr uint32_t kSoftwareIterationLimit = 42000;
+// each round, which takes at most 20,000 (kRoundIterations in leaf_hit.glsl); shading takes another 3,400. Edges, where
+// they are wanted, take 12,000 (kEdgeIterations in border_edges.glsl) and a piece more.
+constexpr uint32_t kSoftwareIterationLimit = 42000, kSoftwareIterationLimitWithEdges = 28000;
 
 // Pixels whose subgroup reached that limit are traced again, one by one, in dispatches of so many
 constexpr uint32_t kMostRetries = 4096;
@@ -61,24 +67,32 @@ public:
 private:
     using Specialisation = std::array<uint32_t, kFrameSpecs>;
 
-    Result<ComputePipeline*> pipeline(TrimMode trim, bool shade, bool count);
+    Result<ComputePipeline*> pipeline(TrimMode trim, bool shade, bool count, bool edges);
     Status prepare_frame(const FrameSetup& setup, uint32_t rows_per_band);
+    Status prepare_edges(const RenderOptions& options, uint32_t rows_per_band);
     Status clear_counts();
     Result<std::array<uint64_t, kFrameCounts>> read_counts();
     Result<double> time_dispatch(const ComputePipeline& pipeline, const FrameView& view, uint32_t groups_x,
                                  uint32_t groups_y);
     Status read_band(const FrameView& view);
+    Status read_edges(const FrameView& view);
     std::vector<uint32_t> stopped_pixels(const FrameView& view) const;
     Result<double> retrace_stopped(const ComputePipeline& pipeline, FrameView view);
     Result<double> trace_band(const ComputePipeline& pipeline, const FrameView& view, bool read_back);
     Result<double> trace_frame(const ComputePipeline& pipeline, FrameView view, uint32_t rows_per_band, Frame* frame);
     void take_pixels(const FrameView& view, Frame& frame) const;
+    void take_edges(const FrameView& view);
+    double draw(const RenderOptions& options, Frame& frame);
 
     std::unique_ptr<VulkanDevice> device_; // first: everything below must be gone before it
     std::shared_ptr<const Scene> scene_;
     SceneFacts facts_;
     std::array<VulkanBuffer, kFrameBindings> buffers_;
     VulkanBuffer readback_;       // of a band's pixels
+    VulkanBuffer edges_readback_; // of a band's edge words
+    bool edges_wanted_ = false;
+    bool has_border_cells_ = false; // on the device, once a picture asked for borders
+    EdgeMap edge_map_;
     VulkanBuffer retries_upload_; // of kMostRetries indices
     VulkanBuffer counts_readback_;
     QueryPool timestamps_;
@@ -124,18 +138,19 @@ Status VulkanTracer::upload()
     return device_->validation_status();
 }
 
-Result<ComputePipeline*> VulkanTracer::pipeline(TrimMode trim, bool shade, bool count)
+Result<ComputePipeline*> VulkanTracer::pipeline(TrimMode trim, bool shade, bool count, bool edges)
 {
     Specialisation constants{};
     constants[kSpecTrimMode] = trim == TrimMode::Sdf      ? kTrimByTexture
                                : trim == TrimMode::Hybrid ? kTrimByBoth
                                                           : kTrimByCells;
     constants[kSpecKinds] = facts_.kinds;
-    constants[kSpecFeatures] = facts_.features | (shade ? kFeatureShade : 0) | (count ? kFeatureCount : 0);
+    constants[kSpecFeatures] =
+        facts_.features | (shade ? kFeatureShade : 0) | (count ? kFeatureCount : 0) | (edges ? kFeatureEdges : 0);
     constants[kSpecStackSize] = facts_.stack_size;
     if (device_->is_software()) {
         constants[kSpecLocalFloats] = facts_.largest_net_floats <= kMostLocalFloats ? facts_.largest_net_floats : 0;
-        constants[kSpecIterationLimit] = kSoftwareIterationLimit;
+        constants[kSpecIterationLimit] = edges ? kSoftwareIterationLimitWithEdges : kSoftwareIterationLimit;
     }
     for (auto& [made_for, made] : pipelines_)
         if (made_for == constants)
@@ -168,6 +183,39 @@ Status VulkanTracer::prepare_frame(const FrameSetup& setup, uint32_t rows_per_ba
             return readback.error();
         readback_ = std::move(*readback);
     }
+    return Done{};
+}
+
+// Uploads the borders' cells when a picture first asks for them, and makes the buffers of a band's edge words. A
+// picture that does not ask has a word in place of each.
+Status VulkanTracer::prepare_edges(const RenderOptions& options, uint32_t rows_per_band)
+{
+    edges_wanted_ = has_effects(options) && edge_query(options).any();
+    if (!has_border_cells_ && (edges_wanted_ || buffers_[kBindBorders].size_bytes() == 0)) {
+        const BorderCells cells = edges_wanted_ ? make_border_cells(scene_->pack.image) : BorderCells{{0}};
+        Result<VulkanBuffer> borders =
+            upload_storage(*device_, std::as_bytes(std::span(cells.words)), "the borders' cells");
+        if (!borders)
+            return borders.error();
+        buffers_[kBindBorders] = std::move(*borders);
+        has_border_cells_ = edges_wanted_;
+    }
+    constexpr size_t kPixelBytes = 2 * sizeof(uint32_t);
+    const size_t band_bytes = edges_wanted_ ? size_t{rows_per_band} * options.width * kPixelBytes : kPixelBytes;
+    if (buffers_[kBindEdges].size_bytes() < band_bytes) {
+        Result<VulkanBuffer> edges = VulkanBuffer::create(*device_, BufferUse::Storage, band_bytes, "the edges");
+        if (!edges)
+            return edges.error();
+        buffers_[kBindEdges] = std::move(*edges);
+    }
+    if (edges_wanted_ && edges_readback_.size_bytes() < band_bytes) {
+        Result<VulkanBuffer> readback = VulkanBuffer::create(*device_, BufferUse::Readback, band_bytes, "the edges");
+        if (!readback)
+            return readback.error();
+        edges_readback_ = std::move(*readback);
+    }
+    if (has_effects(options))
+        edge_map_.resize(options.width, options.height, edge_query(options));
     return Done{};
 }
 
@@ -235,6 +283,15 @@ Status VulkanTracer::read_band(const FrameView& view)
         device_->vk().vkCmdCopyBuffer(commands, buffers_[kBindPixels].handle(), readback_.handle(), 1, &region);
     });
     return copied.ok() ? readback_.invalidate() : copied;
+}
+
+Status VulkanTracer::read_edges(const FrameView& view)
+{
+    const Status copied = device_->run([&](VkCommandBuffer commands) {
+        const VkBufferCopy region{0, 0, size_t{view.width} * view.row_count * 2 * sizeof(uint32_t)};
+        device_->vk().vkCmdCopyBuffer(commands, buffers_[kBindEdges].handle(), edges_readback_.handle(), 1, &region);
+    });
+    return copied.ok() ? edges_readback_.invalidate() : copied;
 }
 
 // Indices in the band of those whose walk was ended by the iteration limit.
@@ -311,8 +368,14 @@ Result<double> VulkanTracer::trace_frame(const ComputePipeline& pipeline, FrameV
         if (!band_ms)
             return band_ms.error();
         ms += *band_ms;
-        if (frame)
-            take_pixels(view, *frame);
+        if (!frame)
+            continue;
+        take_pixels(view, *frame);
+        if (!edges_wanted_)
+            continue;
+        if (const Status read = read_edges(view); !read)
+            return read.error();
+        take_edges(view);
     }
     return ms;
 }
@@ -342,6 +405,40 @@ void VulkanTracer::take_pixels(const FrameView& view, Frame& frame) const
     }
 }
 
+// Copies a band's edge words to the map, and marks the packets that have some.
+void VulkanTracer::take_edges(const FrameView& view)
+{
+    for (uint32_t row = 0; row < view.row_count; ++row) {
+        const uint32_t y = view.first_row + row;
+        if (y % 4 == 0)
+            std::fill_n(&edge_map_.near[edge_map_.packet_of(0, y)], edge_map_.columns, uint8_t{0});
+        for (uint32_t x = 0; x < view.width; ++x) {
+            uint32_t words[2];
+            std::memcpy(words, edges_readback_.mapped() + (size_t{row} * view.width + x) * sizeof words, sizeof words);
+            uint8_t& near = edge_map_.near[edge_map_.packet_of(x, y)];
+            const size_t at = edge_map_.word_of(x, y);
+            if (!edge_map_.line.empty())
+                edge_map_.line[at] = words[0];
+            if (!edge_map_.border.empty())
+                edge_map_.border[at] = words[1];
+            near = static_cast<uint8_t>(near | (words[0] != 0 ? kNearLine : 0) | (words[1] != 0 ? kNearBorder : 0));
+        }
+    }
+}
+
+// The effects' pass over the frame, on the host. Returns milliseconds.
+double VulkanTracer::draw(const RenderOptions& options, Frame& frame)
+{
+    const auto start = std::chrono::steady_clock::now();
+    tbb::task_arena arena(options.threads > 0 ? static_cast<int>(std::min(options.threads, 1024u))
+                                              : tbb::task_arena::automatic);
+    const RunEach run_each = [&arena](uint32_t count, const std::function<void(uint32_t)>& body) {
+        arena.execute([&] { tbb::parallel_for(0u, count, body); });
+    };
+    draw_effects(scene_->pack.image, options, run_each, edge_map_, frame);
+    return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+}
+
 Result<Frame> VulkanTracer::render(const RenderOptions& options, RenderStats& stats)
 {
     const Result<TrimMode> trim = choose_trim(scene_->pack.image, options.trim);
@@ -349,6 +446,8 @@ Result<Frame> VulkanTracer::render(const RenderOptions& options, RenderStats& st
         return trim.error();
     if (*trim == TrimMode::Reference)
         return Error{ErrorCode::UnsupportedPackFeature, "--trim reference", "is the CPU tracer's; use --device cpu"};
+    if (const Status drawable = check_effects(options); !drawable)
+        return drawable.error();
     const VkPhysicalDeviceLimits& limits = device_->properties().limits;
     const size_t row_bytes = size_t{options.width} * sizeof(FramePixel);
     const size_t band_bytes = std::min<size_t>(kBandBytes, limits.maxStorageBufferRange);
@@ -364,14 +463,16 @@ Result<Frame> VulkanTracer::render(const RenderOptions& options, RenderStats& st
         return setup.error();
     if (const Status ready = prepare_frame(*setup, rows_per_band); !ready)
         return ready.error();
+    if (const Status ready = prepare_edges(options, rows_per_band); !ready)
+        return ready.error();
 
     // With one frame it counts its work itself; with more an untimed one before them does
     const uint32_t frames = std::max(options.frames, 1u);
     const bool count_apart = frames > 1;
-    const Result<ComputePipeline*> counting = pipeline(*trim, options.shade, true);
+    const Result<ComputePipeline*> counting = pipeline(*trim, options.shade, true, edges_wanted_);
     if (!counting)
         return counting.error();
-    const Result<ComputePipeline*> timed = pipeline(*trim, options.shade, !count_apart);
+    const Result<ComputePipeline*> timed = pipeline(*trim, options.shade, !count_apart, edges_wanted_);
     if (!timed)
         return timed.error();
     std::array<const VulkanBuffer*, kFrameBindings> bound{};
@@ -404,11 +505,12 @@ Result<Frame> VulkanTracer::render(const RenderOptions& options, RenderStats& st
     stats.trim = *trim;
     for (uint32_t i = 0; i < frames; ++i) {
         // a software driver's frames are always read: only that shows what must be traced again
-        const bool read = i + 1 == frames || device_->is_software();
+        const bool read = i + 1 == frames || device_->is_software() || has_effects(options);
         const Result<double> ms = trace_frame(**timed, setup->view, rows_per_band, read ? &frame : nullptr);
         if (!ms)
             return ms.error();
-        stats.frame_ms.push_back(*ms);
+        // what the host draws counts as much as what the device traces
+        stats.frame_ms.push_back(has_effects(options) ? *ms + draw(options, frame) : *ms);
     }
 
     const Result<std::array<uint64_t, kFrameCounts>> counts = read_counts();
@@ -419,6 +521,7 @@ Result<Frame> VulkanTracer::render(const RenderOptions& options, RenderStats& st
     stats.work.leaf_visits = (*counts)[kCountLeaves];
     stats.work.newton_steps = (*counts)[kCountNewton];
     stats.work.curve_tests = (*counts)[kCountCurves];
+    stats.work.edge_tests = (*counts)[kCountEdges];
     stats.work.uncertified_pixels =
         static_cast<uint64_t>(std::count(frame.certified.begin(), frame.certified.end(), uint8_t{0}));
     if (const Status valid = device_->validation_status(); !valid)

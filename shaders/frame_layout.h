@@ -26,9 +26,13 @@ struct FrameView {
     uint height;    // of the whole picture
     uint first_row; // of this band
     uint row_count;
-    float error_px; // Newton stops at this share of a pixel's footprint
-    float tau_ref;  // mm; hits are kept relative to it
-    uint alone;     // 1: each workgroup traces pixel retries[workgroup] of the band, with one of its invocations
+    float error_px;      // Newton stops at this share of a pixel's footprint
+    float tau_ref;       // mm; hits are kept relative to it
+    float line_width_px; // of lines along borders; the rest as in EdgeQuery (runtime/frame_effects.h)
+    float line_reach_px;
+    float border_reach_px;
+    uint line_classes; // bit kEdge...
+    uint alone;        // 1: each workgroup traces pixel retries[workgroup] of the band, with one of its invocations
 };
 
 // An instance seen from the eye, in its part's units.
@@ -70,7 +74,8 @@ TRIMRAY_CONST uint kCountNodes = 1u;
 TRIMRAY_CONST uint kCountLeaves = 2u;
 TRIMRAY_CONST uint kCountNewton = 3u;
 TRIMRAY_CONST uint kCountCurves = 4u;
-TRIMRAY_CONST uint kFrameCounts = 5u;
+TRIMRAY_CONST uint kCountEdges = 5u;
+TRIMRAY_CONST uint kFrameCounts = 6u;
 
 // Specialisation constants of primary.comp, by constant_id
 TRIMRAY_CONST uint kSpecTrimMode = 0u; // kTrimBy
@@ -88,7 +93,8 @@ TRIMRAY_CONST uint kTrimByBoth = 2u; // the cell's class, the texture outside it
 TRIMRAY_CONST uint kFeatureTrims = 1u;    // some face has trims
 TRIMRAY_CONST uint kFeatureRational = 2u; // some Bezier patch is rational
 TRIMRAY_CONST uint kFeatureShade = 4u;
-TRIMRAY_CONST uint kFeatureCount = 8u; // work counts are wanted
+TRIMRAY_CONST uint kFeatureCount = 8u;  // work counts are wanted
+TRIMRAY_CONST uint kFeatureEdges = 16u; // edge words of each pixel are wanted
 
 TRIMRAY_CONST uint kGroupSide = 8u; // workgroups are 8 x 8 pixels
 
@@ -107,10 +113,12 @@ TRIMRAY_CONST uint kBindSdfWords = 10u;
 TRIMRAY_CONST uint kBindPixels = 11u;
 TRIMRAY_CONST uint kBindCounts = 12u;
 TRIMRAY_CONST uint kBindRetries = 13u;
-TRIMRAY_CONST uint kFrameBindings = 14u;
+TRIMRAY_CONST uint kBindBorders = 14u; // BorderCells (runtime/border_cells.h)
+TRIMRAY_CONST uint kBindEdges = 15u;   // two edge words a pixel: line, border
+TRIMRAY_CONST uint kFrameBindings = 16u;
 
 #ifdef __cplusplus
-static_assert(sizeof(FrameView) == 92);
+static_assert(sizeof(FrameView) == 108);
 static_assert(sizeof(FrameInstance) == 140);
 static_assert(sizeof(FramePixel) == 52);
 } // namespace trimray

@@ -12,6 +12,7 @@
 
 #include "shaders/shared/bezier.h"
 #include "shaders/shared/bvh_node.h"
+#include "shaders/shared/edge.h"
 #include "shaders/shared/language.h"
 #include "shaders/shared/leaf_box.h"
 #include "shaders/shared/patch_newton.h"
@@ -22,6 +23,8 @@
 #include "shaders/shared/trim_lookup.h"
 
 #include "shaders/leaf_hit.glsl"
+
+#include "shaders/border_edges.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
@@ -291,6 +294,8 @@ void main()
             result = hit_pixel(hit, pixel, across);
         if (!complete)
             result.status |= kPixelStopped;
+        if (has_feature(kFeatureEdges))
+            edges[at.y * view.width + at.x] = hit.past < kHuge ? find_edges(hit, pixel) : uvec2(0u);
         pixels[at.y * view.width + at.x] = result;
     }
     if (has_feature(kFeatureCount)) {
@@ -299,5 +304,6 @@ void main()
         tally(kCountLeaves, leaf_visits);
         tally(kCountNewton, newton_steps);
         tally(kCountCurves, curve_tests);
+        tally(kCountEdges, edge_tests);
     }
 }

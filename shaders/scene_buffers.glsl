@@ -13,6 +13,8 @@ layout(scalar, set = 0, binding = kBindSdfWords) readonly buffer SdfWords { uint
 layout(scalar, set = 0, binding = kBindPixels) writeonly buffer Pixels { FramePixel pixels[]; };
 layout(scalar, set = 0, binding = kBindCounts) buffer Counts { uint counts[]; };
 layout(scalar, set = 0, binding = kBindRetries) readonly buffer Retries { uint retries[]; };
+layout(scalar, set = 0, binding = kBindBorders) readonly buffer Borders { uint border_words[]; };
+layout(scalar, set = 0, binding = kBindEdges) writeonly buffer Edges { uvec2 edges[]; };
 layout(scalar, push_constant) uniform View { FrameView view; };
 
 // Specialised to what the pack holds and the frame asks for: what is false here costs no instruction.
@@ -49,4 +51,5 @@ uint node_visits = 0u;
 uint leaf_visits = 0u;
 uint newton_steps = 0u;
 uint curve_tests = 0u;
+uint edge_tests = 0u;
 uint iterations = 0u;

@@ -334,6 +334,27 @@ class Render(CliTest):
         one = self.render("one.exr", "--size", "64x48", "--threads", 1).read_bytes()
         self.assertEqual(one, self.render("two.exr", "--size", "64x48", "--threads", 2).read_bytes())
 
+    def test_edges_silhouettes_and_smoothed_trims_are_drawn_where_they_are_asked_for(self):
+        small = ("--size", "64x48", "--device", "cpu", "--json")
+        drawn = {}
+        for name, options, effects in [
+                ("plain", [], []), ("sharp", ["--edges", "sharp"], ["edges"]),
+                ("all", ["--edges", "all", "--edge-color", "#ff0000", "--edge-width", "3"], ["edges", "edges-smooth"]),
+                ("rims", ["--silhouettes"], ["silhouettes"]), ("smooth", ["--antialias", "trims"], ["trim-antialiasing"]),
+                ("lines", ["--style", "edges-only"], ["edges", "silhouettes", "unfilled-faces"]),
+                ("few", ["--style", "edges-only", "--no-silhouettes"], ["edges", "unfilled-faces"])]:
+            report = self.json_of("render", PACK, "-o", WORK / (name + ".png"), *small, *options)
+            self.assertEqual(report["effects"][report["effects"].index("shading") + 1:], effects)
+            self.assertEqual("edge_tests" in report["work"], name != "plain")
+            drawn[name] = read_png(WORK / (name + ".png"))[2]
+        self.assertEqual(len({str(rows) for rows in drawn.values()}), len(drawn))
+        for option, value, said in [("--edges", "shap", "'sharp'"), ("--style", "edges", "edges-only"),
+                                    ("--antialias", "trim", "'trims'"), ("--edge-width", "0", "--edge-width"),
+                                    ("--edge-width", "61", "60"), ("--edge-color", "#12", "#rrggbb")]:
+            self.fails(1, "render", PACK, "-o", WORK / "g.png", option, value, says=[option, said])
+        self.fails(1, "render", PACK, "-o", WORK / "g.png", "--style", "edges-only", "--edges", "none",
+                   "--no-silhouettes", says=["--style", "nothing"])
+
     def test_views_differ_and_an_eye_stands_where_it_is_told(self):
         front = self.render("front.png", "--size", "40x30", "--view", "front").read_bytes()
         top = self.render("top.png", "--size", "40x30", "--view", "top").read_bytes()

@@ -66,6 +66,22 @@ TEST(effect_plan, grows_by_what_is_added_and_by_nothing_else)
                                      "face-colors", "instance-colors", "many-starts", "shading"));
 }
 
+TEST(effect_plan, names_what_is_drawn_and_only_that)
+{
+    const PackImage image = bare_plane();
+    RenderOptions options;
+    options.edges = EdgeLines::Sharp;
+    EXPECT_THAT(names(image, options), testing::ElementsAre("plane", "shading", "edges"));
+    options.edges = EdgeLines::All;
+    options.silhouettes = true;
+    options.antialias_trims = true;
+    options.fill = false;
+    EXPECT_THAT(names(image, options), testing::ElementsAre("plane", "shading", "edges", "edges-smooth", "silhouettes",
+                                                            "trim-antialiasing", "unfilled-faces"));
+    options.shade = false;
+    EXPECT_THAT(names(image, options), testing::ElementsAre("plane"));
+}
+
 TEST(effect_plan, names_the_trims_as_they_are_asked_for)
 {
     PackImage image = bare_plane();

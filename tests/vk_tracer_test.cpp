@@ -168,6 +168,38 @@ TEST_F(vk_tracer, hybrid_trims_answer_as_exact_ones)
     EXPECT_LT(hybrid_stats.work.curve_tests, exact_stats.work.curve_tests);
 }
 
+TEST_F(vk_tracer, draws_what_the_cpu_tracer_draws)
+{
+    TracedScene builder = all_kinds();
+    builder.place({1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0});
+    builder.place({0, -0.5, 0, -12, 0.5, 0, 0, -4, 0, 0, 0.75, -6}); // turned and unevenly scaled
+    const auto scene = builder.finish();
+    const auto tracer = make(scene);
+    ASSERT_TRUE(tracer);
+    const auto cpu = make_cpu_tracer(scene);
+    ASSERT_TRUE(cpu.ok());
+    RenderOptions options = small_picture({20, -40, 25});
+    options.edges = EdgeLines::All;
+    for (const bool all : {false, true}) {
+        options.silhouettes = options.antialias_trims = all;
+        options.fill = !all;
+        RenderStats stats;
+        const Frame expected = render(**cpu, options);
+        const Frame actual = render(*tracer, options, &stats);
+        EXPECT_GT(stats.work.edge_tests, 0u);
+        size_t drawn = 0, differ = 0;
+        for (size_t i = 0; i < expected.face.size(); ++i) {
+            double most = 0;
+            for (size_t c = 0; c < 4; ++c)
+                most = std::max(most, std::abs(double(expected.rgba[4 * i + c]) - double(actual.rgba[4 * i + c])));
+            differ += most > 0.02; // steps of 1/256 pixel, and what they do to a colour
+            drawn += expected.rgba[4 * i + 3] > 0;
+        }
+        EXPECT_GT(drawn, all ? 800u : 2500u);
+        EXPECT_LE(differ, expected.face.size() / 500) << "where a hit is another, so is what is drawn on it";
+    }
+}
+
 TEST_F(vk_tracer, traces_pictures_of_several_bands)
 {
     TracedScene builder;

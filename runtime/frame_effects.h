@@ -1,0 +1,58 @@
+// What is drawn over a traced frame: lines along borders and silhouettes, and anti-aliased borders. A tracer notes for
+// each pixel where the nearest border of its face is (EdgeMap); a pass over the frame, the same for both tracers, draws
+// from these notes, the depths and the normals. It changes colours alone.
+//
+// A border belongs to both of its faces, and each pixel's face draws its side of a line. Where nothing borders on the
+// other side (the line is an outline, before a farther surface or the background), the pixels there get the other half
+// from their neighbour, so that lines are as wide everywhere.
+#pragma once
+
+#include "format/pack_image.h"
+#include "runtime/camera.h"
+#include "runtime/tracer.h"
+
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+namespace trimray {
+
+/// What a tracer must find out about borders for the effects of a request.
+struct EdgeQuery {
+    uint32_t line_classes = 0; // bit kEdge...: such borders go to EdgeMap::line
+    float line_width_px = 0;   // 0: no lines along borders
+    float line_reach_px = 0;   // as far as lines need to be known
+    float border_reach_px = 0; // as far as borders of any class need to be known (EdgeMap::border); 0: not at all
+    bool any() const { return line_reach_px > 0 || border_reach_px > 0; }
+    float reach_px() const { return line_reach_px > border_reach_px ? line_reach_px : border_reach_px; }
+};
+EdgeQuery edge_query(const RenderOptions& options);
+
+/// Whether a request's effects make sense. Fails: Usage.
+Status check_effects(const RenderOptions& options);
+
+/// Edge words (shaders/shared/edge.h) of a frame in packets of 4 x 4 pixels, row by row. Words of a packet mean
+/// something only where `near` says so.
+struct EdgeMap {
+    uint32_t columns = 0, rows = 0; // packets
+    std::vector<uint8_t> near;      // kNear... bits, by packet
+    std::vector<uint32_t> line, border;
+
+    void resize(uint32_t width, uint32_t height, const EdgeQuery& query);
+    size_t packet_of(uint32_t x, uint32_t y) const { return size_t{y / 4} * columns + x / 4; }
+    size_t word_of(uint32_t x, uint32_t y) const { return 16 * packet_of(x, y) + 4 * (y % 4) + x % 4; }
+};
+constexpr uint8_t kNearLine = 1, kNearBorder = 2;
+
+/// Runs body(i) for i in [0, count), at once where threads allow.
+using RunEach = std::function<void(uint32_t count, const std::function<void(uint32_t)>& body)>;
+
+/// Whether `options` asks for anything that draw_effects does.
+bool has_effects(const RenderOptions& options);
+
+/// Draws the effects of `options` into frame.rgba. `map` is what the tracer noted for edge_query(options).
+/// The result does not depend on how `run_each` orders its calls.
+void draw_effects(const PackImage& image, const RenderOptions& options, const RunEach& run_each, EdgeMap& map,
+                  Frame& frame);
+
+} // namespace trimray

@@ -1,0 +1,206 @@
+// The nearest borders of a hit's face as edge words (shaders/shared/edge.h): line, border. The CPU tracer's way is
+// runtime/cpu_edges.h.
+
+// A border's point is measured in loops of so many iterations; where loops are limited, so many are left to a pixel.
+const uint kNearestIterations = uint(kNearestSteps) + 2u;
+const uint kEdgeIterations = 12000u;
+
+struct NearestBorder {
+    vec2 offset;
+    float square; // of its length; kHuge: none
+    float strength;
+};
+
+// What a hit is measured with
+struct Measured {
+    PatchRecord patch;
+    uint kind;
+    vec2 uv; // uv_face
+    PixelRows rows;
+    PixelMap map;
+    Derivatives native; // of native kinds
+    vec3 p;             // the hit in patch space, of Bezier patches
+    float line_strength;
+};
+
+NearestBorder nearest_line;
+NearestBorder nearest_border;
+
+SurfacePoint bezier_at(PatchRecord patch, vec2 uv_face)
+{
+    vec2 uv = (uv_face - vec2(patch.uv_offset[0], patch.uv_offset[1])) / vec2(patch.uv_scale[0], patch.uv_scale[1]);
+    uint degree_u = (patch.shape >> 8) & 0xffu;
+    uint degree_v = (patch.shape >> 16) & 0xffu;
+    bool rational = has_feature(kFeatureRational) && (patch.shape & kShapeRational) != 0u;
+    iterations += 1u + bezier_iterations(degree_u, degree_v);
+    return bezier_point(patch.first_control_point, int(degree_u), int(degree_v), rational, uv);
+}
+
+Measured measured_hit(Hit hit, FrameInstance instance, PatchRecord patch, vec2 pixel)
+{
+    Measured m;
+    m.patch = patch;
+    m.kind = patch.shape & 0xffu;
+    m.uv = hit.uv_face;
+    PatchRay ray = patch_ray(instance, patch, pixel);
+    m.p = ray.origin + hit.t * ray.direction;
+    float per_scale = 1.0f / patch.scale;
+    vec3 axis_x = vector(patch.axis_x);
+    vec3 axis_y = vector(patch.axis_y);
+    vec3 axis_z = vector(patch.axis_z);
+    vec3 step_x = project(axis_x, axis_y, axis_z, vector(instance.step_x)) * per_scale;
+    vec3 step_y = project(axis_x, axis_y, axis_z, vector(instance.step_y)) * per_scale;
+    m.rows = pixel_rows(ray.direction, step_x, step_y, ray.anchor + hit.t);
+    vec2 uv_scale = vec2(patch.uv_scale[0], patch.uv_scale[1]);
+    m.native = plane_derivatives();
+    float r = patch.param[0];
+    if (m.kind == kKindBezier && has_kind(kKindBezier)) {
+        SurfacePoint s = bezier_at(patch, hit.uv_face);
+        m.map = pixel_map(m.rows, s.du, s.dv, uv_scale);
+    } else {
+        if (m.kind == kKindCylinder && has_kind(kKindCylinder))
+            m.native = cylinder_derivatives(m.p);
+        else if (m.kind == kKindCone && has_kind(kKindCone))
+            m.native = cone_derivatives(r, patch.param[1], m.p);
+        else if (m.kind == kKindSphere && has_kind(kKindSphere))
+            m.native = sphere_derivatives(m.p);
+        else if (m.kind == kKindTorus && has_kind(kKindTorus))
+            m.native = torus_derivatives(r, torus_side(r, patch.param[1], m.p), m.p);
+        m.map = pixel_map(m.rows, m.native.u, m.native.v, uv_scale);
+    }
+    m.line_strength = view.line_width_px > 0.0f ? line_strength(seen_thickness(m.map), view.line_width_px) : 1.0f;
+    return m;
+}
+
+void take_nearer(inout NearestBorder nearest, vec2 offset, float square, float strength)
+{
+    if (square < nearest.square)
+        nearest = NearestBorder(offset, square, strength);
+}
+
+// Offers the border's point at uv_face, the nearest in the plane of the map.
+void offer_border(Measured m, float reach, uint edge_class, vec2 uv_face)
+{
+    bool as_line = ((view.line_classes >> edge_class) & 1u) != 0u;
+    bool as_border = view.border_reach_px > 0.0f;
+    vec2 step = uv_face - m.uv;
+    vec2 offset = to_pixels(m.map, step);
+    if (!(as_line || as_border) || dot(offset, offset) > reach * reach)
+        return;
+    if (m.kind == kKindBezier && has_kind(kKindBezier)) {
+        SurfacePoint there = bezier_at(m.patch, uv_face);
+        offset = unless_turned(m.rows, m.map, there.du, there.dv, seen_step(m.rows, there.p - m.p));
+    } else if (m.kind != kKindPlane)
+        offset = seen_bent(m.rows, m.map, m.native, step / vec2(m.patch.uv_scale[0], m.patch.uv_scale[1]));
+    float square = dot(offset, offset);
+    if (as_line)
+        take_nearer(nearest_line, offset, square, m.line_strength);
+    if (as_border)
+        take_nearer(nearest_border, offset, square, 1.0f);
+}
+
+void measure_line(Measured m, float reach, uint edge_class, vec2 a, vec2 b)
+{
+    ++edge_tests;
+    float t = nearest_on_line(to_pixels(m.map, a - m.uv), to_pixels(m.map, b - m.uv));
+    offer_border(m, reach, edge_class, a + (b - a) * t);
+}
+
+void measure_piece(Measured m, float reach, FaceRecord face, uint word, vec2 box_lo, vec2 box_hi)
+{
+    uint at = face.first_point + (word >> kPiecePointShift);
+    bool cubic = (word & kPieceCubic) != 0u;
+    uint edge_class = (word >> kPieceClassShift) & 3u;
+    vec2 a = trim_points[at];
+    vec2 d = trim_points[at + (cubic ? 3u : 1u)];
+    // a piece is monotone: it lies in its ends' box
+    if (any(lessThan(max(a, d), box_lo)) || any(greaterThan(min(a, d), box_hi)))
+        return;
+    if (!cubic) {
+        measure_line(m, reach, edge_class, a, d);
+        return;
+    }
+    ++edge_tests;
+    vec2 b = trim_points[at + 1u];
+    vec2 c = trim_points[at + 2u];
+    float t = nearest_on_cubic(to_pixels(m.map, a - m.uv), to_pixels(m.map, b - m.uv), to_pixels(m.map, c - m.uv),
+                               to_pixels(m.map, d - m.uv));
+    iterations += kNearestIterations;
+    offer_border(m, reach, edge_class, cubic_at(a, b, c, d, t).p);
+}
+
+// First and last cell of a box in one direction; where a face is so far away that there are many, the middle ones
+uvec2 cells_between(float lo, float hi, uint count)
+{
+    const uint kMostCells = 8u;
+    uint first = min(uint(clamp(lo, 0.0f, 1.0f) * float(count)), count - 1u);
+    uint last = min(uint(clamp(hi, 0.0f, 1.0f) * float(count)), count - 1u);
+    if (last - first >= kMostCells) {
+        first = (first + last - kMostCells) / 2u;
+        last = first + kMostCells - 1u;
+    }
+    return uvec2(first, last);
+}
+
+void measure_pieces(Measured m, float reach, uint face_index, FaceRecord face, vec2 box_lo, vec2 box_hi)
+{
+    uint size = border_words[2u * face_index];
+    uint columns = size & 0xffffu;
+    if (columns == 0u)
+        return;
+    uint cells = border_words[2u * face_index + 1u];
+    uvec2 i = cells_between(box_lo.x, box_hi.x, columns);
+    uvec2 j = cells_between(box_lo.y, box_hi.y, size >> 16);
+    iterations = 0u;
+    for (uint row = j.x; row <= j.y; ++row) {
+        uint at = border_words[cells + row * columns + i.x];
+        uint end = border_words[cells + row * columns + i.y + 1u];
+        for (; at < end; ++at) {
+            measure_piece(m, reach, face, border_words[at], box_lo, box_hi);
+            ++iterations;
+            if (iteration_limit > 0u && iterations > kEdgeIterations)
+                return;
+        }
+    }
+}
+
+void measure_sides(Measured m, float reach, FaceRecord face, vec2 box_lo, vec2 box_hi)
+{
+    for (uint side = 0u; side < 4u; ++side) {
+        uint edge_class = (face.border_classes >> (2u * side)) & 3u;
+        bool along_v = side < 2u;
+        bool low = side % 2u == 0u;
+        float lo = along_v ? box_lo.x : box_lo.y;
+        float hi = along_v ? box_hi.x : box_hi.y;
+        if (edge_class == kEdgeSeam || (low ? lo > 0.0f : hi < 1.0f))
+            continue;
+        float at = low ? 0.0f : 1.0f;
+        vec2 a = along_v ? vec2(at, 0.0f) : vec2(0.0f, at);
+        vec2 b = along_v ? vec2(at, 1.0f) : vec2(1.0f, at);
+        measure_line(m, reach, edge_class, a, b);
+    }
+}
+
+uint word_within(NearestBorder nearest, float reach)
+{
+    return nearest.square <= reach * reach ? edge_word(nearest.offset, nearest.strength) : 0u;
+}
+
+// The words of the nearest line and the nearest border
+uvec2 find_edges(Hit hit, vec2 pixel)
+{
+    PatchRecord patch = patches[leaves[hit.leaf].patch];
+    FaceRecord face = faces[patch.face];
+    nearest_line = NearestBorder(vec2(0.0f), kHuge, 1.0f);
+    nearest_border = nearest_line;
+    Measured m = measured_hit(hit, instances[hit.instance], patch, pixel);
+    float reach = max(view.line_reach_px, view.border_reach_px);
+    vec2 around = reach_in_uv(m.map, reach);
+    vec2 box_lo = m.uv - around;
+    vec2 box_hi = m.uv + around;
+    if ((face.flags & kFaceNaturalBorder) != 0u)
+        measure_sides(m, reach, face, box_lo, box_hi);
+    else
+        measure_pieces(m, reach, patch.face, face, box_lo, box_hi);
+    return uvec2(word_within(nearest_line, view.line_reach_px), word_within(nearest_border, view.border_reach_px));
+}

@@ -1,0 +1,234 @@
+// Where a face's borders lie beside a hit, in pixels: the map from uv_face to the picture and the nearest point of a
+// piece under it.
+//
+// Near a hit the picture of the surface is linear: a point at uv + duv is seen at the pixel + A duv, A =
+// d(pixel)/d(uv). A is the inverse of the uv-to-pixel Jacobian that a texture's distances are divided by, and unlike it
+// A exists at every slant: distances measured after A are pixels, so what is drawn with them is as wide edge-on as it
+// is face-on. Source: the paper, eq. 6 (a point is on the border where its distance is below a bound) and 7 (a smooth
+// blend).
+#if defined(TRIMRAY_SHARED_EDGE_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef TRIMRAY_SHARED_EDGE_H
+#undef TRIMRAY_SHARED_EDGE_H
+#else
+#define TRIMRAY_SHARED_EDGE_H
+#endif
+
+#include "format/pack_layout.h"
+#include "shaders/shared/language.h"
+
+SHARED_OPEN
+
+// ---- derivatives ---------------------------------------------------------------------------------------------------
+// Of a native surface at its point p, patch space, by uv_patch. Parametrisations: pack_layout.h. With rho the signed
+// distance from the axis, (cos u, sin u) = (x, y) / rho.
+struct Derivatives {
+    real3 u;
+    real3 v;
+    real3 uu;
+    real3 uv;
+    real3 vv;
+};
+
+// u turns about the axis on every kind but the plane; S_v = (k x, k y, rise), S_vv = (l x, l y, bend)
+FN Derivatives turned(real3 p, real k, real rise, real l, real bend)
+{
+    real none = real(0.0f);
+    Derivatives s;
+    s.u = real3(-p.y, p.x, none);
+    s.v = real3(k * p.x, k * p.y, rise);
+    s.uu = real3(-p.x, -p.y, none);
+    s.uv = real3(-k * p.y, k * p.x, none);
+    s.vv = real3(l * p.x, l * p.y, bend);
+    return s;
+}
+FN Derivatives plane_derivatives()
+{
+    real3 none = real3(real(0.0f), real(0.0f), real(0.0f));
+    Derivatives s;
+    s.u = real3(real(1.0f), real(0.0f), real(0.0f));
+    s.v = real3(real(0.0f), real(1.0f), real(0.0f));
+    s.uu = none;
+    s.uv = none;
+    s.vv = none;
+    return s;
+}
+FN Derivatives cylinder_derivatives(real3 p)
+{
+    real none = real(0.0f);
+    return turned(p, none, real(1.0f), none, none);
+}
+// S_v = (sin a cos u, sin a sin u, cos a)
+FN Derivatives cone_derivatives(scalar r, scalar tan_a, real3 p)
+{
+    scalar cos_a = 1.0f / sqrt(1.0f + tan_a * tan_a);
+    real rho = r + p.z * tan_a;
+    real none = real(0.0f);
+    return turned(p, tan_a * cos_a / select(abs(rho) > 1e-20f, rho, real(1e-20f)), real(cos_a), none, none);
+}
+// S_v = (-z cos u, -z sin u, rho), S_vv = -S
+FN Derivatives sphere_derivatives(real3 p)
+{
+    real rho = sqrt(p.x * p.x + p.y * p.y);
+    return turned(p, -p.z / max(rho, real(1e-20f)), rho, real(-1.0f), -p.z);
+}
+// S_v = (-z cos u, -z sin u, rho - R), S_vv = -((rho - R) cos u, (rho - R) sin u, z); `side`: torus_side
+FN Derivatives torus_derivatives(scalar R, real side, real3 p)
+{
+    real rho = side * sqrt(p.x * p.x + p.y * p.y);
+    real per_rho = 1.0f / select(abs(rho) > 1e-20f, rho, real(1e-20f));
+    return turned(p, -p.z * per_rho, rho - R, (R - rho) * per_rho, -p.z);
+}
+
+// ---- the map to pixels ---------------------------------------------------------------------------------------------
+struct PixelMap {
+    real2 du; // pixels a unit of uv_face
+    real2 dv;
+};
+
+// A point q = eye + T (w0 + x step_x + y step_y) of patch space is seen at pixel (x, y). With w = w0 + x step_x + y
+// step_y its differential dq = dT w + T (dx step_x + dy step_y) gives
+//     dx = dq . (step_y x w) / (T D),  dy = dq . (w x step_x) / (T D),  D = step_x . (step_y x w)
+struct PixelRows {
+    real3 x; // pixels a unit of patch space
+    real3 y;
+};
+FN PixelRows pixel_rows(real3 w, scalar3 step_x, scalar3 step_y, real T)
+{
+    real3 to_x = cross(real3(step_y), w);
+    real3 to_y = cross(w, real3(step_x));
+    real volume = T * dot(real3(step_x), to_x);
+    real per_volume = 1.0f / select(abs(volume) > 1e-30f, volume, real(1e-30f));
+    PixelRows rows;
+    rows.x = to_x * per_volume;
+    rows.y = to_y * per_volume;
+    return rows;
+}
+FN real2 seen_step(PixelRows rows, real3 dq)
+{
+    return real2(dot(rows.x, dq), dot(rows.y, dq));
+}
+
+// su and sv by uv_patch; uv_scale is the patch's (uv_face a unit of uv_patch)
+FN PixelMap pixel_map(PixelRows rows, real3 su, real3 sv, scalar2 uv_scale)
+{
+    PixelMap map;
+    map.du = seen_step(rows, su) * real(1.0f / uv_scale.x);
+    map.dv = seen_step(rows, sv) * real(1.0f / uv_scale.y);
+    return map;
+}
+
+// Where a point of the surface is seen, from a pixel's middle; kHuge away where the surface has turned round on the way
+// there: beyond a rim nothing is seen of it.
+FN real2 unless_turned(PixelRows rows, PixelMap here, real3 su, real3 sv, real2 offset)
+{
+    real2 du = seen_step(rows, su);
+    real2 dv = seen_step(rows, sv);
+    real facing = (du.x * dv.y - du.y * dv.x) * (here.du.x * here.dv.y - here.du.y * here.dv.x);
+    return real2(select(facing > 0.0f, offset.x, real(kHuge)), offset.y);
+}
+
+// Of a native surface, the point at uv_patch + step, to the second order: near a rim the first order is next to
+// nothing, and what lies round the bend would seem to be at hand. uv_scale > 0 and does not change a sign.
+FN real2 seen_bent(PixelRows rows, PixelMap here, Derivatives s, real2 step)
+{
+    real3 bent_u = s.uu * step.x + s.uv * step.y;
+    real3 bent_v = s.uv * step.x + s.vv * step.y;
+    real3 dq = (s.u + bent_u * real(0.5f)) * step.x + (s.v + bent_v * real(0.5f)) * step.y;
+    return unless_turned(rows, here, s.u + bent_u, s.v + bent_v, seen_step(rows, dq));
+}
+
+FN real2 to_pixels(PixelMap map, real2 duv)
+{
+    return map.du * duv.x + map.dv * duv.y;
+}
+
+// Half sides of the box in uv_face around the points that are seen within `radius` pixels; kHuge edge-on
+FN real2 reach_in_uv(PixelMap map, scalar radius)
+{
+    // rows of A^-1 = ((dv.y, -dv.x), (-du.y, du.x)) / det
+    real det = abs(map.du.x * map.dv.y - map.du.y * map.dv.x);
+    real per_det = radius / max(det, real(1e-30f));
+    real u = length(map.dv) * per_det;
+    real v = length(map.du) * per_det;
+    return real2(min(u, real(kHuge)), min(v, real(kHuge)));
+}
+
+// How wide the face's whole domain is seen across its thinner direction, pixels
+FN real seen_thickness(PixelMap map)
+{
+    real det = abs(map.du.x * map.dv.y - map.du.y * map.dv.x);
+    real longer = sqrt(max(dot(map.du, map.du), dot(map.dv, map.dv)));
+    return det / max(longer, real(1e-30f));
+}
+
+// ---- nearest points ------------------------------------------------------------------------------------------------
+// All in pixels from the pixel's centre, which is the origin.
+
+// The parameter of the nearest point of the segment a b
+FN real nearest_on_line(real2 a, real2 b)
+{
+    real2 along = b - a;
+    real t = -dot(a, along) / max(dot(along, along), real(1e-30f));
+    return clamp(t, real(0.0f), real(1.0f));
+}
+
+struct CurvePoint {
+    real2 p;
+    real2 third; // of the derivative
+};
+// de Casteljau: the last two points give the place and the derivative
+FN CurvePoint cubic_at(real2 a, real2 b, real2 c, real2 d, real t)
+{
+    real2 ab = a + (b - a) * t;
+    real2 bc = b + (c - b) * t;
+    real2 cd = c + (d - c) * t;
+    real2 abc = ab + (bc - ab) * t;
+    real2 bcd = bc + (cd - bc) * t;
+    CurvePoint at;
+    at.third = bcd - abc;
+    at.p = abc + at.third * t;
+    return at;
+}
+
+// The parameter of the nearest point of the cubic Bezier a b c d, for a point that is near it against its radius of
+// curvature: Gauss-Newton on |P(t)|^2 from the chord's nearest point. A piece is monotone, so its chord runs along it.
+const int kNearestSteps = 4;
+FN_LARGE real nearest_on_cubic(real2 a, real2 b, real2 c, real2 d)
+{
+    real t = nearest_on_line(a, d);
+    for (int i = 0; i < kNearestSteps; ++i) {
+        CurvePoint at = cubic_at(a, b, c, d, t);
+        real step = dot(at.p, at.third) / max(3.0f * dot(at.third, at.third), real(1e-30f));
+        t = clamp(t - step, real(0.0f), real(1.0f));
+    }
+    return t;
+}
+
+// ---- what a pixel keeps of it --------------------------------------------------------------------------------------
+// One word: the offset to the nearest border, x | y << 14, each (pixels + 32) * 256, and a strength << 28, 1 to 15; 0:
+// none is near.
+const scalar kEdgeWordReach = 31.0f; // pixels: the largest offset
+const scalar kEdgeWordLeast = 2.0f / 256.0f;
+
+// Domain: |offset| <= kEdgeWordReach, strength in [0, 1]. A border through the pixel's centre keeps its direction: it
+// is moved off it by two steps.
+FN integer edge_word(real2 offset, real strength)
+{
+    real2 kept = offset * max(kEdgeWordLeast / max(length(offset), real(1e-20f)), real(1.0f));
+    integer x = to_integer((kept.x + 32.0f) * 256.0f + 0.5f);
+    integer y = to_integer((kept.y + 32.0f) * 256.0f + 0.5f);
+    integer full = to_integer(strength * 14.0f + 1.5f);
+    return x | (y << integer(14u)) | (full << integer(28u));
+}
+
+// Lines never cover more of a face than this share of its width: from afar a face of two pixels is shaded, not black.
+const scalar kLargestShare = 0.5f;
+
+// How strongly a face's lines of this width are drawn where it is seen so thin, 0 to 1. Two borders take one width.
+FN real line_strength(real thickness, scalar width)
+{
+    return min(thickness * (kLargestShare / width), real(1.0f));
+}
+
+SHARED_CLOSE
+#endif
