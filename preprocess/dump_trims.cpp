@@ -47,6 +47,17 @@ private:
     std::vector<Rgb> pixels_;
 };
 
+struct DrawnPiece {
+    MonotonePiece curve;
+    Rgb color;
+};
+
+Rgb class_color(uint edge_class)
+{
+    constexpr Rgb kColors[kEdgeClassCount] = {{0, 0, 0}, {30, 80, 255}, {255, 140, 0}, {200, 0, 200}};
+    return kColors[edge_class];
+}
+
 /// One panel's place in the picture.
 struct Panel {
     Picture& picture;
@@ -60,15 +71,15 @@ struct Panel {
                 picture.set(x0 + x, kMargin + y, color((x + 0.5) / width, (y + 0.5) / height));
     }
 
-    void draw(const std::vector<MonotonePiece>& pieces) const
+    void draw(const std::vector<DrawnPiece>& pieces) const
     {
-        for (const MonotonePiece& piece : pieces) {
+        for (const auto& [piece, color] : pieces) {
             const double length = std::hypot((piece.u[3] - piece.u[0]) * width, (piece.v[3] - piece.v[0]) * height);
             const int steps = 2 + static_cast<int>(4 * length);
             for (int i = 0; i <= steps; ++i) {
                 const double t = static_cast<double>(i) / steps;
                 picture.set(x0 + static_cast<int>(std::lround(bezier3(piece.u, t) * (width - 1))),
-                            kMargin + static_cast<int>(std::lround(bezier3(piece.v, t) * (height - 1))), {0, 0, 0});
+                            kMargin + static_cast<int>(std::lround(bezier3(piece.v, t) * (height - 1))), color);
             }
             for (const int end : {0, 3}) // where pieces meet
                 for (int d = -1; d <= 1; ++d) {
@@ -122,9 +133,12 @@ Rgb distance_color(const PackImage& image, const FaceRecord& face, double u, dou
 bool dump_face(const PackImage& image, const FaceRecord& face, const std::filesystem::path& path)
 {
     std::vector<MonotonePiece> pieces;
-    for (uint i = 0; i < face.piece_count; ++i)
-        pieces.push_back(
-            load_piece(image.trim_points.data(), face.first_point, image.trim_pieces[face.first_piece + i]));
+    std::vector<DrawnPiece> drawn;
+    for (uint i = 0; i < face.piece_count; ++i) {
+        const uint word = image.trim_pieces[face.first_piece + i];
+        pieces.push_back(load_piece(image.trim_points.data(), face.first_point, word));
+        drawn.push_back({pieces.back(), class_color(word >> kPieceClassShift & (kEdgeClassCount - 1))});
+    }
     const double u_mm = std::max(face.extent_mm[0], 1e-30f), v_mm = std::max(face.extent_mm[1], 1e-30f);
     const double scale = kLongSide / std::max(u_mm, v_mm);
     const int width = std::max(kShortSideMin, static_cast<int>(std::lround(scale * u_mm)));
@@ -135,7 +149,7 @@ bool dump_face(const PackImage& image, const FaceRecord& face, const std::filesy
     const Panel cells{picture, kMargin, width, height};
     if (face.grid != 0)
         cells.fill([&](double u, double v) { return cell_color(image, face, u, v); });
-    cells.draw(pieces);
+    cells.draw(drawn);
 
     const TrimMask inside = scan_convert(pieces, pixel_centres(static_cast<uint>(width), static_cast<uint>(height)));
     const Panel mask{picture, 2 * kMargin + width, width, height};
@@ -146,7 +160,7 @@ bool dump_face(const PackImage& image, const FaceRecord& face, const std::filesy
     if (face.sdf_size != 0) {
         const Panel distance{picture, 3 * kMargin + 2 * width, width, height};
         distance.fill([&](double u, double v) { return distance_color(image, face, u, v); });
-        distance.draw(pieces);
+        distance.draw(drawn);
     }
     return picture.write(path);
 }

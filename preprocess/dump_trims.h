@@ -11,7 +11,8 @@ namespace trimray {
 /// Writes `directory`/face_NNNNNN.ppm for every trimmed face, and index.txt with a line of numbers for each face.
 /// Panels from left to right, v upwards: the loops over the cells' classes (white in, grey out, tinted mixed, more
 /// entries darker), the mask, the distance field (warm in, cold out, the band dimmed), each with the loops drawn in
-/// black. The folder is made if need be. Fails: FileNotWritable.
+/// the colours of edge classes: sharp black, smooth blue, seam orange, free purple. The folder is made if need be.
+/// Fails: FileNotWritable.
 Status dump_trims(const PackImage& image, const std::string& directory);
 
 } // namespace trimray

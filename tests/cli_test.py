@@ -486,6 +486,14 @@ class Pack(CliTest):
             self.assertIn(key, report)
         self.assertEqual((report["faces"], report["converted"], report["dropped"]), (29, 29, []))
         self.assertTrue({"read", "transfer", "convert", "trims", "bvh", "write"} <= set(report["seconds"]))
+        trims = report["trims"]
+        self.assertLess(trims["largest_pcurve_deviation_mm"], 1)
+        self.assertLessEqual(len(trims["edges_above_tolerance"]), trims["pcurves_above_tolerance"])
+        self.assertEqual(sum(trims["findings"].values()), len(report["trim_findings"]))
+
+    def test_says_what_is_doubtful_about_trims(self):
+        text = self.ok("pack", MODEL, "-o", WORK / "again.tray").stdout
+        self.assertRegex(text, r"\ntrims +pcurves within \S+ mm of their edges, \d+ beyond an edge's tolerance, \d+ rebuilt")
 
     def test_the_same_model_gives_the_same_bytes(self):
         self.ok("pack", MODEL, "-o", WORK / "same.tray")
