@@ -33,7 +33,7 @@ uint from_grid(uint k, int bits)
     return std::bit_cast<uint>(static_cast<float>(std::ldexp(static_cast<int>(k), -bits)));
 }
 
-// ---- control nets and trim points ----------------------------------------------------------------------------------
+// ---- control nets and trims ----------------------------------------------------------------------------------------
 
 constexpr int kTrimBits = 22, kPolynomialBits = 22, kRationalBits = 24;
 
@@ -105,6 +105,32 @@ void code_points(std::span<uint> words, Way way)
         } else {
             last += unzigzag(words[n]);
             words[n] = from_grid(last, kTrimBits);
+        }
+    }
+}
+
+/// Pieces beside the piece before, whose points, class and kind are taken to go on; a face's first piece has point 0.
+void code_pieces(const std::vector<FaceRecord>& faces, std::span<uint> words, Way way)
+{
+    std::vector<bool> begins(words.size(), false);
+    for (const FaceRecord& face : faces)
+        if (face.first_piece < words.size())
+            begins[face.first_piece] = true;
+    uint before = 0; // the word of the piece before
+    constexpr uint kClassMask = kEdgeClassCount - 1;
+    for (size_t n = 0; n < words.size(); ++n) {
+        const uint step = (before & kPieceCubic) != 0 ? 3u : 1u;
+        const uint point = n == 0 || begins[n] ? 0u : (before >> kPiecePointShift) + step;
+        const uint edge_class = before >> kPieceClassShift & kClassMask, cubic = before & kPieceCubic;
+        const uint word = words[n];
+        if (way == Way::Predict) {
+            words[n] = zigzag((word >> kPiecePointShift) - point) << 3 |
+                       (((word >> kPieceClassShift) - edge_class) & kClassMask) << 1 | ((word ^ cubic) & kPieceCubic);
+            before = word;
+        } else {
+            before = (unzigzag(word >> 3) + point) << kPiecePointShift |
+                     (((word >> 1) + edge_class) & kClassMask) << kPieceClassShift | ((word ^ cubic) & kPieceCubic);
+            words[n] = before;
         }
     }
 }
@@ -250,6 +276,8 @@ void code_records(std::string_view id, const PackImage& image, std::span<std::by
         on_array<uint>(records, [&](std::span<uint> words) { code_nets(image.patches, words, way); });
     else if (id == "TPNT")
         on_array<uint>(records, [&](std::span<uint> words) { code_points(words, way); });
+    else if (id == "TPCE")
+        on_array<uint>(records, [&](std::span<uint> words) { code_pieces(image.faces, words, way); });
     else if (id == "NODE")
         on_array<BvhNode>(records, [&](std::span<BvhNode> nodes) { code_trees(nodes, way); });
     else
@@ -260,7 +288,7 @@ void code_records(std::string_view id, const PackImage& image, std::span<std::by
 
 bool has_prediction(std::string_view id)
 {
-    return id == "CTRL" || id == "TPNT" || id == "NODE" || id == "SDFW";
+    return id == "CTRL" || id == "TPNT" || id == "TPCE" || id == "NODE" || id == "SDFW";
 }
 
 std::vector<std::byte> predict_records(std::string_view id, const PackImage& image, std::span<const std::byte> records)

@@ -1,5 +1,5 @@
-// Filter 2: what a section's words are beside what the words before them lead to expect. Control nets, trim points,
-// trees and textures become small numbers, which the columns of filter 1 and zstd then make short. SPEC.md, "Filter 2".
+// Filter 2: what a section's words are beside what the words before them lead to expect. Control nets, trims, trees and
+// textures become small numbers, which the columns of filter 1 and zstd then make short. SPEC.md, "Filter 2".
 #pragma once
 
 #include "format/pack_image.h"

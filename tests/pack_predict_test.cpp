@@ -20,6 +20,18 @@ PackImage predictable_pack()
     derive_trees(image);
     for (int i = 0; i < 200; ++i)
         image.trim_points.push_back(std::ldexp(std::nearbyint(std::ldexp(0.5 + 0.4 * std::sin(0.1 * i), 22)), -22));
+    // two faces with a loop of lines and cubics each, of three edge classes
+    image.trim_pieces.clear();
+    for (uint f = 0; f < 2; ++f) {
+        image.faces[f].first_piece = uint(image.trim_pieces.size());
+        image.faces[f].piece_count = 30;
+        uint point = 0;
+        for (uint i = 0; i < 30; ++i) {
+            const uint cubic = i % 10 < 6 ? kPieceCubic : 0;
+            image.trim_pieces.push_back(point << kPiecePointShift | i / 10 << kPieceClassShift | cubic);
+            point += cubic != 0 ? 3 : 1;
+        }
+    }
     uint first_word = 0;
     for (uint f = 0; f < 2; ++f) {
         const uint width = 6 + f, height = 5;
@@ -38,6 +50,7 @@ void for_each_predicted(const PackImage& image, F&& f)
 {
     f("CTRL", std::as_bytes(std::span(image.control_points)));
     f("TPNT", std::as_bytes(std::span(image.trim_points)));
+    f("TPCE", std::as_bytes(std::span(image.trim_pieces)));
     f("NODE", std::as_bytes(std::span(image.part_nodes)));
     f("SDFW", std::as_bytes(std::span(image.sdf_words)));
 }
@@ -94,6 +107,7 @@ TEST(pack_predict, any_bytes_restore_to_the_same_records_every_time)
         FaceRecord& face = image.faces[random() % image.faces.size()];
         face.sdf_size = repeat % 2 == 0 ? random() : random() & 0x00070007u;
         face.sdf_first_word = random() % 30;
+        face.first_piece = repeat % 2 == 0 ? random() : random() % 60;
         for_each_predicted(image, [&](std::string_view id, std::span<const std::byte> records) {
             std::vector<std::byte> bytes(records.size());
             for (std::byte& b : bytes)

@@ -117,6 +117,17 @@ def restore_points(content, contents):
     return struct.pack(f"<{len(words)}I", *words)
 
 
+def restore_pieces(content, contents):
+    words, faces, before = list(struct.unpack(f"<{len(content) // 4}I", content)), contents["FACE"], 0
+    begins = {0} | {struct.unpack_from("<I", faces, at + 48)[0] for at in range(0, len(faces), 136)}
+    for n, word in enumerate(words):
+        point = 0 if n in begins else (before >> 4) + (3 if before & 1 else 1)
+        point = point + unzigzag(word >> 3) & 0xFFFFFFF
+        before = point << 4 | ((word >> 1) + (before >> 2) & 3) << 2 | (word ^ before) & 1
+        words[n] = before
+    return struct.pack(f"<{len(words)}I", *words)
+
+
 def restore_textures(content, contents):
     out, end, faces = bytearray(content), 0, contents["FACE"]
     for at in range(0, len(faces), 136):
@@ -176,7 +187,8 @@ def restore_trees(content, contents):
     return b"".join(struct.pack("<3I4B12B12B4I2I", *node) for node in nodes)
 
 
-RESTORE = {"CTRL": restore_nets, "TPNT": restore_points, "NODE": restore_trees, "SDFW": restore_textures}
+RESTORE = {"CTRL": restore_nets, "TPNT": restore_points, "TPCE": restore_pieces, "NODE": restore_trees,
+           "SDFW": restore_textures}
 
 
 def decompress(stored, entry):
