@@ -119,6 +119,11 @@ TRIMRAY_CONST uint kEdgeClassCount = 4u;
 // there do the domain's upper borders belong to the face as the lower ones do.
 TRIMRAY_CONST float kUvBelowOne = 0.99999994f;
 
+// A hit belongs to the face as far as this outside of its domain, in uv_face, and is answered as the border's nearest
+// point: by so much the rounding of an angle (2.5e-7 of 2 pi) and of uv_scale may move it. Borders that need to reach
+// farther, because the neighbour's may be farther away, lie farther out in the pack.
+TRIMRAY_CONST float kDomainSlack = 4e-6f;
+
 // CellEntry: a piece that passes through a mixed cell. Query q = (u, v) in a cell of grid index floor(uv * grid):
 //   inside = corner_inside  XOR over the cell's entries of  horizontal(e)  XOR  vertical(e)
 //   with piece ends (ua, va), (ub, vb), va <= vb; the path runs from q along +u to the cell's reference line, then

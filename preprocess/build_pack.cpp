@@ -133,10 +133,19 @@ void convert_trims(ConvertedFace& face, const TrimOptions& options)
     face.dropped_reason = first_bad_number(face);
 }
 
-void convert_surface(ConvertedFace& face, const PartFrame& frame)
+void convert_surface(ConvertedFace& face, const PartFrame& frame, TrimOptions options)
 {
-    const Status appended =
-        append_patches(face.cad->surface, face.trims.domain, frame, 0, face.patches, face.control_points);
+    const auto append = [&] {
+        return append_patches(face.cad->surface, face.trims.domain, frame, 0, face.patches, face.control_points);
+    };
+    Status appended = append();
+    if (!appended.ok() && options.grow) {
+        // beyond its knots a rational spline may have weights that are not positive: then its border stays
+        options.grow = false;
+        convert_trims(face, options);
+        if (face.dropped_reason.empty())
+            appended = append();
+    }
     if (!appended.ok())
         face.dropped_reason = appended.error().detail;
     else if (face.patches.empty())
@@ -267,7 +276,7 @@ void run(const CadModel& model, const BuildOptions& options, PackImage& image, B
         frames.push_back(part_frame(faces, first_of_part[part], first_of_part[part + 1]));
     for_each_face([&](ConvertedFace& face) {
         if (face.dropped_reason.empty())
-            convert_surface(face, frames[face.part]);
+            convert_surface(face, frames[face.part], options.trims);
     });
     std::vector<std::vector<uint>> face_ids(model.parts.size());
     for (size_t part = 0; part < model.parts.size(); ++part) {

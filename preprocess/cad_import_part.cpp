@@ -1,4 +1,5 @@
 // Parts: faces and edges of a shape, each face converted or dropped with a reason, and the triangles of the proxy mesh.
+#include "preprocess/border_gap.h"
 #include "preprocess/cad_import_kernel.h"
 #include "preprocess/edge_class.h"
 
@@ -141,6 +142,7 @@ CadPart convert_part(const PartShape& source, uint32_t part_index, const ImportO
         part.faces.push_back(std::move(out));
     }
     classify_edges(part);
+    measure_border_gaps(part, diagonal_mm(shape));
     return part;
 }
 

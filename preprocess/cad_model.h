@@ -53,6 +53,7 @@ struct CadEdgeUse {
     double file_deviation_mm = 0; // of the file's pcurve, where another took its place
     PcurveState state = PcurveState::WithinTolerance;
     uint32_t edge_class = kEdgeSharp; // classify_edges
+    double gap_mm = 0;                // what this face's border and a neighbour's may miss each other by along the edge
 };
 
 struct CadEdge {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 namespace trimray {
 namespace {
@@ -54,6 +55,7 @@ Vec2d speed_at(const CadSurface& surface, double v)
 struct Use {
     const CadEdgeUse* edge = nullptr;
     int index = kNoUse; // over the face's loops in order
+    bool held = false;  // no neighbour but the face itself: a seam, a pole, a cut into the face
     bool backwards = false;
     Vec2d ends[2];
     Rect2d box; // of samples
@@ -179,6 +181,7 @@ bool join(CurvePiece& before, CurvePiece& after, Vec2d offset, const CadFace& fa
     report.largest_gap_mm = std::max(report.largest_gap_mm, gap_mm);
     if (flat_mm > kJoinTolerances * metric.tolerance_mm) {
         filler = line_piece(a, b);
+        filler.grow_mm = 0; // no neighbour there
         if (gap_mm > std::max(face.tolerance_mm, kJoinTolerances * metric.tolerance_mm)) {
             report.had_open_loop = true;
             report.findings.push_back({TrimFindingKind::OpenLoop, a, gap_mm, report.loop, report.loop});
@@ -186,6 +189,9 @@ bool join(CurvePiece& before, CurvePiece& after, Vec2d offset, const CadFace& fa
         return true;
     }
     report.largest_move_mm = std::max(report.largest_move_mm, 0.5 * flat_mm);
+    for (CurvePiece* piece : {&before, &after})
+        if (piece->grow_mm != kHeld)
+            piece->grow_mm += 0.5 * flat_mm;
     const Vec2d half{0.5 * (b.x - a.x), 0.5 * (b.y - a.y)};
     before.p[2] = {before.p[2].x + half.x, before.p[2].y + half.y};
     before.p[3] = {a.x + half.x, a.y + half.y};
@@ -297,6 +303,10 @@ std::vector<TrimChain> build_chains(const CadFace& face, double relative_toleran
     std::vector<std::vector<Use>> loops;
     Rect2d rough = kEmptyRect;
     int index = kNoUse;
+    std::map<uint32_t, int> uses_of_edge;
+    for (const CadLoop& loop : face.loops)
+        for (const CadEdgeUse& edge : loop)
+            ++uses_of_edge[edge.edge];
     for (const CadLoop& loop : face.loops) {
         loops.emplace_back();
         for (const CadEdgeUse& edge : loop) {
@@ -307,6 +317,7 @@ std::vector<TrimChain> build_chains(const CadFace& face, double relative_toleran
                 continue; // an edge without length
             Use use{&edge,
                     index,
+                    edge.seam || edge.degenerate || uses_of_edge[edge.edge] > 1,
                     edge.reversed,
                     {curve_point(edge.pcurve, edge.first), curve_point(edge.pcurve, edge.last)},
                     kEmptyRect};
@@ -363,6 +374,7 @@ std::vector<TrimChain> build_chains(const CadFace& face, double relative_toleran
                 reverse_pieces(fit.pieces);
             for (CurvePiece& piece : fit.pieces) {
                 piece.use = placed.use.index;
+                piece.grow_mm = placed.use.held ? kHeld : e.gap_mm + fit.deviation;
                 for (Vec2d& p : piece.p)
                     p = {p.x + placed.shift.x, p.y + placed.shift.y};
             }

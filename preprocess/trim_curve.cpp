@@ -557,8 +557,8 @@ void split_piece(const CurvePiece& piece, double t, CurvePiece& before, CurvePie
     const auto mix = [t](Vec2d a, Vec2d b) { return (1 - t) * a + t * b; };
     const Vec2d a = mix(piece.p[0], piece.p[1]), b = mix(piece.p[1], piece.p[2]), c = mix(piece.p[2], piece.p[3]);
     const Vec2d ab = mix(a, b), bc = mix(b, c), middle = mix(ab, bc);
-    before = {{piece.p[0], a, ab, middle}, piece.cubic, piece.use};
-    after = {{middle, bc, c, piece.p[3]}, piece.cubic, piece.use};
+    before = {{piece.p[0], a, ab, middle}, piece.cubic, piece.use, piece.grow_mm};
+    after = {{middle, bc, c, piece.p[3]}, piece.cubic, piece.use, piece.grow_mm};
 }
 
 bool is_straight(const SplineCurve2d& curve)

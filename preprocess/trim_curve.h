@@ -11,12 +11,16 @@ namespace trimray {
 /// CurvePiece::use of what no edge runs along: a line that closes a gap, a pole, the border of a period's window.
 inline constexpr int kNoUse = -1;
 
+/// CurvePiece::grow_mm of what stays on its line: seams, poles, the border of a period's window.
+inline constexpr double kHeld = -1;
+
 /// A line (points 0 and 3) or a polynomial cubic Bezier in uv; the control points are ordered in u and in v, so the
 /// piece is monotone in both.
 struct CurvePiece {
     Vec2d p[4];
     bool cubic = false;
-    int use = kNoUse; // the edge use that it comes from, counted over the face's loops in order
+    int use = kNoUse;       // the edge use that it comes from, counted over the face's loops in order
+    double grow_mm = kHeld; // what it is moved outwards by, less rounding (trim_grow.h)
 };
 
 /// Puts the inner points of a cubic in order between its ends, in u and in v; where they were, nothing changes.

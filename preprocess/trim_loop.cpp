@@ -1,6 +1,7 @@
 #include "preprocess/trim_loop.h"
 
 #include "format/trim_piece.h"
+#include "preprocess/trim_grow.h"
 #include "preprocess/trim_window.h"
 
 #include <fmt/format.h>
@@ -85,8 +86,11 @@ double merge_lines(Pieces& pieces, const UseClasses& class_of, Vec2d metric, dou
             double off = distance(middle, a, b);
             for (const Vec2d& corner : corners)
                 off = std::max(off, distance(corner, a, b));
-            if (ahead >= 0 && off <= tolerance) {
+            const bool alike = (piece.grow_mm == kHeld) == (out.back().grow_mm == kHeld);
+            if (ahead >= 0 && off <= tolerance && alike) {
                 worst = std::max(worst, off);
+                if (piece.grow_mm != kHeld)
+                    out.back().grow_mm = std::max(out.back().grow_mm, piece.grow_mm) + off;
                 corners.push_back(middle);
                 out.back().p[3] = b;
                 continue;
@@ -256,13 +260,20 @@ Result<TrimLoops> build_trim_loops(const CadFace& face, const TrimOptions& optio
     for (TrimChain& chain : chains) {
         map_to_face(chain.pieces, loops.domain, snap);
         merged_mm = std::max(merged_mm, merge_lines(chain.pieces, class_of, mm_per_face, 0.1 * metric.tolerance_mm));
-        append_loop(chain.pieces, class_of, loops);
     }
     std::vector<CheckedLoop> checked;
     for (const TrimChain& chain : chains)
         checked.push_back({&chain.pieces, chain.loop});
     loops.findings = std::move(report.findings);
     check_loops(checked, face, loops.domain, loops.findings);
+    if (options.grow) {
+        GrowReport grown;
+        loops.domain = grow_loops(chains, face.surface, loops.domain, grown);
+        loops.largest_growth_mm = grown.largest_mm;
+        loops.loops_not_grown = grown.loops_not_grown;
+    }
+    for (const TrimChain& chain : chains)
+        append_loop(chain.pieces, class_of, loops);
     std::vector<MonotonePiece> pieces;
     for (const uint32_t word : loops.pieces)
         pieces.push_back(load_piece(loops.points.data(), 0, word));

@@ -13,6 +13,7 @@ namespace trimray {
 struct TrimOptions {
     double tolerance =
         1e-6; // largest deviation of a piece from its pcurve, relative to the domain's longer side on the surface
+    bool grow = true; // move borders outwards by what neighbours may miss each other by (trim_grow.h)
 };
 
 /// The trims of one face. An empty piece list with natural_border = true: the domain rectangle is the trim.
@@ -27,6 +28,8 @@ struct TrimLoops {
     double largest_gap = 0;       // closed gap, relative to the domain
     double largest_deviation = 0; // of the simplification, relative to the domain
     std::vector<TrimFinding> findings;
+    double largest_growth_mm = 0; // that a piece was moved outwards by
+    int loops_not_grown = 0;      // they cross themselves, or are holes smaller than their growth
 };
 
 /// Fails: InvalidTrim with the reason (no area, not finite, ...).

@@ -96,10 +96,12 @@ void press_into(Pieces& pieces, Axis axis, double lo, double hi)
             continue;
         const bool lay_there = on_border(axis.along(piece.p[0])) && on_border(axis.along(piece.p[3]));
         const int use = lay_there ? piece.use : kNoUse;
+        const double grow_mm = lay_there ? piece.grow_mm : kHeld;
         axis.along(piece.p[0]) = std::clamp(axis.along(piece.p[0]), lo, hi);
         axis.along(piece.p[3]) = std::clamp(axis.along(piece.p[3]), lo, hi);
         piece = line_piece(piece.p[0], piece.p[3]);
         piece.use = use;
+        piece.grow_mm = grow_mm;
     }
 }
 

@@ -28,11 +28,6 @@
 
 SHARED_OPEN
 
-// uv_face may leave [0,1] by the rounding of an angle (2.5e-7 of 2 pi) and of uv_scale: patches meet without a gap
-constexpr float kDomainSlack = 4e-6f;
-// Newton may end outside of its patch by this much of uv_patch, so that neighbours overlap
-constexpr float kUvOverlap = 1e-5f;
-
 class BlockTracer {
 public:
     BlockTracer(const BlockJob& job, BlockScratch& scratch, Frame& frame, WorkCounts& work)

@@ -1,11 +1,7 @@
 // A ray against one leaf: into the patch's space, the leaf's box, the roots, the face's domain and its trims.
 
-// uv_face may leave [0,1] by the rounding of an angle (2.5e-7 of 2 pi) and of uv_scale: patches meet without a gap
-const float kDomainSlack = 4e-6f;
-// Newton may end outside of its patch by this much of uv_patch, so that neighbours overlap
-const float kUvOverlap = 1e-5f;
-const float kBoxMargin = 1e-6f; // patch units: the ray's rounding, and the box's
-const uint kCurveIterations = 32u;             // bound of left_of_cubic
+const float kBoxMargin = 1e-6f;                    // patch units: the ray's rounding, and the box's
+const uint kCurveIterations = 32u;                 // bound of left_of_cubic
 const uint kTorusIterations = 3u * 24u + 4u * 32u; // bound of torus_roots
 
 // Where loops are limited, one leaf may take so many iterations: 13 steps at degree 25, and a few hundred trim pieces.
@@ -106,8 +102,7 @@ bool in_range(PatchRay ray, float t, Hit hit)
 
 // Takes the root at t if it is in the face's domain, inside its trims and nearer than what was found. Of two hits
 // within rounding the one of the lower instance and leaf stays, whatever the order.
-void offer(PatchRay ray, FaceRecord face, uint leaf, uint instance, float t, vec2 uv_patch, vec2 uv_face,
-           inout Hit hit)
+void offer(PatchRay ray, FaceRecord face, uint leaf, uint instance, float t, vec2 uv_patch, vec2 uv_face, inout Hit hit)
 {
     vec2 off = abs(uv_face - 0.5f);
     if (max(off.x, off.y) > 0.5f + kDomainSlack)

@@ -12,6 +12,9 @@ namespace {
 
 using namespace shapes;
 
+/// Loops as the pcurves say, to compare with what is known of them.
+constexpr TrimOptions kNotGrown{.grow = false};
+
 std::vector<MonotonePiece> pieces_of(const TrimLoops& loops)
 {
     std::vector<MonotonePiece> pieces;
@@ -75,7 +78,7 @@ void expect_sound(const TrimLoops& loops)
 TEST(trim_loop, a_plate_with_a_hole_keeps_its_area)
 {
     const auto loops = build_trim_loops(
-        plane_face({polygon_loop({{0, 0}, {10, 0}, {10, 5}, {0, 5}}), {use_of(circle_curve({4, 2}, 1))}}), {});
+        plane_face({polygon_loop({{0, 0}, {10, 0}, {10, 5}, {0, 5}}), {use_of(circle_curve({4, 2}, 1))}}), kNotGrown);
     ASSERT_TRUE(loops.ok());
     expect_sound(*loops);
     EXPECT_NEAR(area_of(*loops), 50 - M_PI, 1e-4);
@@ -86,7 +89,7 @@ TEST(trim_loop, a_plate_with_a_hole_keeps_its_area)
 
 TEST(trim_loop, a_disc_needs_three_cubics_a_quadrant_at_most)
 {
-    const auto loops = build_trim_loops(plane_face({{use_of(circle_curve({3, 3}, 2))}}), {});
+    const auto loops = build_trim_loops(plane_face({{use_of(circle_curve({3, 3}, 2))}}), kNotGrown);
     ASSERT_TRUE(loops.ok());
     expect_sound(*loops);
     EXPECT_NEAR(area_of(*loops), 4 * M_PI, 1e-4);
@@ -98,7 +101,7 @@ TEST(trim_loop, a_rectangle_is_its_domain_whatever_the_number_of_its_edges)
 {
     const auto loops = build_trim_loops(
         plane_face({polygon_loop({{0, 0}, {3, 0}, {7, 1e-9}, {10, 0}, {10, 2}, {10, 5}, {5, 5}, {0, 5}, {1e-8, 3}})}),
-        {});
+        kNotGrown);
     ASSERT_TRUE(loops.ok());
     EXPECT_TRUE(loops->natural_border);
     EXPECT_TRUE(loops->pieces.empty());
@@ -110,7 +113,7 @@ TEST(trim_loop, a_cylinder_with_its_seam_edges_is_its_domain)
     const double p = 2 * M_PI;
     CadLoop loop = polygon_loop({{0, 0}, {p, 0}, {p, 3}, {0, 3}});
     loop[1].seam = loop[3].seam = true;
-    const auto loops = build_trim_loops(cylinder_face(2, {loop}), {});
+    const auto loops = build_trim_loops(cylinder_face(2, {loop}), kNotGrown);
     ASSERT_TRUE(loops.ok());
     EXPECT_TRUE(loops->natural_border);
     EXPECT_NEAR(area_of(*loops), 3 * p, 1e-6);
@@ -121,7 +124,7 @@ TEST(trim_loop, two_circles_around_a_cylinder_without_a_seam_bound_the_band_betw
     const double p = 2 * M_PI;
     for (const double start : {0.0, 1.0, 5.0}) {
         const CadLoop bottom{use_of(line_curve({0, 1}, {p, 1}))}, top{use_of(line_curve({start + p, 4}, {start, 4}))};
-        const auto loops = build_trim_loops(cylinder_face(2, {bottom, top}), {});
+        const auto loops = build_trim_loops(cylinder_face(2, {bottom, top}), kNotGrown);
         ASSERT_TRUE(loops.ok());
         EXPECT_TRUE(loops->natural_border);
         EXPECT_NEAR(area_of(*loops), 3 * p, 1e-6);
@@ -135,7 +138,7 @@ TEST(trim_loop, a_hole_across_a_cylinders_seam_has_the_same_area_at_sixteen_rota
         const double turn = p * i / 16;
         const auto seamed = build_trim_loops(cylinder_face(2, {polygon_loop({{0, 0}, {p, 0}, {p, 3}, {0, 3}}),
                                                                {use_of(circle_curve({turn, 1.5}, 1, true))}}),
-                                             {});
+                                             kNotGrown);
         ASSERT_TRUE(seamed.ok());
         expect_sound(*seamed);
         EXPECT_NEAR(area_of(*seamed), 3 * p - M_PI, 2e-4) << i;
@@ -144,7 +147,7 @@ TEST(trim_loop, a_hole_across_a_cylinders_seam_has_the_same_area_at_sixteen_rota
         const auto seamless = build_trim_loops(cylinder_face(2, {{use_of(line_curve({0, 0}, {p, 0}))},
                                                                  {use_of(line_curve({p, 3}, {0, 3}))},
                                                                  {use_of(circle_curve({turn, 1.5}, 1, true))}}),
-                                               {});
+                                               kNotGrown);
         ASSERT_TRUE(seamless.ok());
         EXPECT_NEAR(area_of(*seamless), 3 * p - M_PI, 2e-4) << i;
     }
@@ -185,7 +188,7 @@ TEST(trim_loop, a_curve_of_a_hundred_thousand_segments_becomes_few_pieces_within
         for (const CadEdgeUse& use : polygon_loop({wave(1), {10, 5}, {0, 5}, {0, 0}}))
             loop.push_back(use);
         loop.pop_back();
-        const auto loops = build_trim_loops(plane_face({loop}), {});
+        const auto loops = build_trim_loops(plane_face({loop}), kNotGrown);
         ASSERT_TRUE(loops.ok());
         expect_sound(*loops);
         EXPECT_LE(loops->pieces.size(), 40u) << "noise " << noise;
@@ -211,7 +214,7 @@ TEST(trim_loop, collinear_segments_become_one_line)
     loop.push_back(use_of(line_curve({8, 3}, {6, 5})));
     loop.push_back(use_of(line_curve({6, 5}, {4, 7})));
     loop.push_back(use_of(line_curve({4, 7}, {0, 0})));
-    const auto loops = build_trim_loops(plane_face({loop}), {});
+    const auto loops = build_trim_loops(plane_face({loop}), kNotGrown);
     ASSERT_TRUE(loops.ok());
     expect_sound(*loops);
     EXPECT_EQ(loops->pieces.size(), 3u);
@@ -222,7 +225,7 @@ TEST(trim_loop, circles_of_every_size_stay_within_the_tolerance)
     for (const double radius : {4.9, 1.0, 0.1, 0.01, 0.001}) {
         const auto loops = build_trim_loops(
             plane_face({polygon_loop({{0, 0}, {10, 0}, {10, 10}, {0, 10}}), {use_of(circle_curve({5, 5}, radius))}}),
-            {});
+            kNotGrown);
         ASSERT_TRUE(loops.ok());
         expect_sound(*loops);
         for (const MonotonePiece& p : pieces_of(*loops)) {
@@ -240,13 +243,13 @@ TEST(trim_loop, uses_out_of_order_and_turned_around_are_put_right)
 {
     std::mt19937 rng(2);
     const std::vector<Vec2d> corners = {{0, 0}, {4, 1}, {7, 0}, {9, 3}, {6, 6}, {5, 3}, {2, 5}, {-1, 3}};
-    const double area = area_of(*build_trim_loops(plane_face({polygon_loop(corners)}), {}));
+    const double area = area_of(*build_trim_loops(plane_face({polygon_loop(corners)}), kNotGrown));
     for (int i = 0; i < 50; ++i) {
         CadLoop loop = polygon_loop(corners);
         std::shuffle(loop.begin(), loop.end(), rng);
         for (CadEdgeUse& use : loop)
             use.reversed = rng() % 2 == 0;
-        const auto loops = build_trim_loops(plane_face({loop}), {});
+        const auto loops = build_trim_loops(plane_face({loop}), kNotGrown);
         ASSERT_TRUE(loops.ok());
         expect_sound(*loops);
         EXPECT_FALSE(loops->had_open_loop);
@@ -259,7 +262,7 @@ TEST(trim_loop, gaps_are_closed_and_reported)
     for (const double gap : {1e-12, 1e-8, 1e-6, 9e-6, 1e-4, 1e-3, 1e-2}) {
         CadLoop loop = polygon_loop({{0, 0}, {1, 0}, {1, 1}, {0, 1}});
         loop[1] = use_of(line_curve({1, gap}, {1 - gap, 1}));
-        const auto loops = build_trim_loops(plane_face({loop}), {});
+        const auto loops = build_trim_loops(plane_face({loop}), kNotGrown);
         ASSERT_TRUE(loops.ok());
         expect_sound(*loops);
         EXPECT_NEAR(loops->largest_gap, gap, 1e-3 * gap + 1e-15);
@@ -281,11 +284,11 @@ CadFace sphere_face(std::vector<CadLoop> loops)
 TEST(trim_loop, a_circle_around_a_sphere_bounds_the_cap_on_its_left)
 {
     const double p = 2 * M_PI, pole = M_PI / 2;
-    const auto north = build_trim_loops(sphere_face({{use_of(line_curve({0, 0.3}, {p, 0.3}))}}), {});
+    const auto north = build_trim_loops(sphere_face({{use_of(line_curve({0, 0.3}, {p, 0.3}))}}), kNotGrown);
     ASSERT_TRUE(north.ok());
     EXPECT_TRUE(north->natural_border);
     EXPECT_NEAR(area_of(*north), p * (pole - 0.3), 1e-9);
-    const auto south = build_trim_loops(sphere_face({{use_of(line_curve({p, 0.3}, {0, 0.3}))}}), {});
+    const auto south = build_trim_loops(sphere_face({{use_of(line_curve({p, 0.3}, {0, 0.3}))}}), kNotGrown);
     ASSERT_TRUE(south.ok());
     EXPECT_NEAR(area_of(*south), p * (pole + 0.3), 1e-9);
 }
@@ -296,10 +299,10 @@ TEST(trim_loop, a_sphere_of_seams_and_poles_is_its_domain_with_or_without_the_po
     CadLoop loop = polygon_loop({{p, -h}, {p, h}, {0, h}, {0, -h}});
     loop[0].seam = loop[2].seam = true;
     loop[1].degenerate = loop[3].degenerate = true;
-    const auto whole = build_trim_loops(sphere_face({loop}), {});
+    const auto whole = build_trim_loops(sphere_face({loop}), kNotGrown);
     ASSERT_TRUE(whole.ok());
     EXPECT_TRUE(whole->natural_border);
-    const auto bare = build_trim_loops(sphere_face({{loop[0], loop[2]}}), {});
+    const auto bare = build_trim_loops(sphere_face({{loop[0], loop[2]}}), kNotGrown);
     ASSERT_TRUE(bare.ok());
     EXPECT_TRUE(bare->natural_border);
     EXPECT_FALSE(bare->had_open_loop); // a pole is one point
@@ -310,11 +313,11 @@ TEST(trim_loop, a_hole_alone_on_a_closed_surface_leaves_the_rest_of_it)
 {
     const double whole = 2 * M_PI * M_PI;
     for (const double at : {0.0, 3.0}) { // across the seam, and not
-        const auto loops = build_trim_loops(sphere_face({{use_of(circle_curve({at, 0.1}, 0.5, true))}}), {});
+        const auto loops = build_trim_loops(sphere_face({{use_of(circle_curve({at, 0.1}, 0.5, true))}}), kNotGrown);
         ASSERT_TRUE(loops.ok());
         expect_sound(*loops);
         EXPECT_NEAR(area_of(*loops), whole - M_PI * 0.25, 1e-4);
-        const auto patch = build_trim_loops(sphere_face({{use_of(circle_curve({at, 0.1}, 0.5))}}), {});
+        const auto patch = build_trim_loops(sphere_face({{use_of(circle_curve({at, 0.1}, 0.5))}}), kNotGrown);
         ASSERT_TRUE(patch.ok());
         EXPECT_NEAR(area_of(*patch), M_PI * 0.25, 1e-4);
     }
@@ -329,17 +332,17 @@ TEST(trim_loop, a_band_around_a_torus_lies_on_the_side_its_circles_say)
     face.surface.minor_radius = 1;
     face.surface.period_u = face.surface.period_v = p;
     face.surface.natural_bounds = {{0, 0}, {p, p}};
-    const auto inner = build_trim_loops(face, {});
+    const auto inner = build_trim_loops(face, kNotGrown);
     ASSERT_TRUE(inner.ok());
     EXPECT_NEAR(area_of(*inner), p * 1.5, 1e-9);
     for (CadLoop& loop : face.loops)
         loop[0].reversed = true;
-    const auto outer = build_trim_loops(face, {});
+    const auto outer = build_trim_loops(face, kNotGrown);
     ASSERT_TRUE(outer.ok());
     EXPECT_NEAR(area_of(*outer), p * (p - 1.5), 1e-9);
     // around the small way
     face.loops = {{use_of(line_curve({1, 0}, {1, p}))}, {use_of(line_curve({2, p}, {2, 0}))}};
-    const auto other = build_trim_loops(face, {});
+    const auto other = build_trim_loops(face, kNotGrown);
     ASSERT_TRUE(other.ok());
     EXPECT_NEAR(area_of(*other), p * (p - 1), 1e-9); // left of the upward circle at u = 1, right of u = 2
 }
@@ -354,7 +357,7 @@ TEST(trim_loop, the_inner_sheet_of_a_spindle_torus_between_its_poles_is_its_doma
     face.surface.minor_radius = 2;
     face.surface.period_u = face.surface.period_v = 2 * M_PI;
     face.surface.natural_bounds = {{0, 0}, {2 * M_PI, 2 * M_PI}};
-    const Result<TrimLoops> loops = build_trim_loops(face, {});
+    const Result<TrimLoops> loops = build_trim_loops(face, kNotGrown);
     ASSERT_TRUE(loops.ok()) << loops.error().detail;
     EXPECT_TRUE(loops->natural_border);
     EXPECT_DOUBLE_EQ(loops->domain.hi.x - loops->domain.lo.x, M_PI);
@@ -367,7 +370,7 @@ TEST(trim_loop, a_thread_of_many_turns_is_wrapped_into_one)
     const auto loops = build_trim_loops(
         cylinder_face(
             2, {polygon_loop({{0, 0}, {turns * p, turns * pitch}, {turns * p, turns * pitch + width}, {0, width}})}),
-        {});
+        kNotGrown);
     ASSERT_TRUE(loops.ok());
     expect_sound(*loops);
     EXPECT_NEAR(loops->domain.hi.x - loops->domain.lo.x, p, 1e-9);
@@ -376,7 +379,7 @@ TEST(trim_loop, a_thread_of_many_turns_is_wrapped_into_one)
 
 TEST(trim_loop, a_loop_that_crosses_itself_is_filled_by_even_odd)
 {
-    const auto eight = build_trim_loops(plane_face({polygon_loop({{0, 0}, {2, 2}, {2, 0}, {0, 2}})}), {});
+    const auto eight = build_trim_loops(plane_face({polygon_loop({{0, 0}, {2, 2}, {2, 0}, {0, 2}})}), kNotGrown);
     ASSERT_TRUE(eight.ok());
     EXPECT_NEAR(area_of(*eight), 2, 1e-6);
 }
@@ -390,7 +393,7 @@ TEST(trim_loop, every_orientation_of_nested_loops_is_the_same_region)
         for (int i = 0; i < 3; ++i)
             if ((mask >> i & 1) != 0)
                 loops[static_cast<size_t>(i)] = turned(loops[static_cast<size_t>(i)]);
-        const auto built = build_trim_loops(plane_face(loops), {});
+        const auto built = build_trim_loops(plane_face(loops), kNotGrown);
         ASSERT_TRUE(built.ok());
         expect_sound(*built);
         EXPECT_NEAR(area_of(*built), 100 - 12 * M_PI, 1e-3);
@@ -400,7 +403,7 @@ TEST(trim_loop, every_orientation_of_nested_loops_is_the_same_region)
 TEST(trim_loop, what_cannot_bound_a_face_is_refused_with_a_reason)
 {
     const auto detail = [](const CadFace& face) {
-        const auto loops = build_trim_loops(face, {});
+        const auto loops = build_trim_loops(face, kNotGrown);
         EXPECT_FALSE(loops.ok());
         if (!loops.ok()) {
             EXPECT_EQ(loops.error().code, ErrorCode::InvalidTrim);

@@ -38,6 +38,9 @@ FN RayPlanes ray_planes(real3 origin, real3 direction)
 // two roots.
 const scalar kGrazing = 0.15f;
 
+// Newton may end outside of its patch by this much of uv_patch, so that neighbours overlap
+const scalar kUvOverlap = 1e-5f;
+
 const int kNewtonSteps = 12;
 // Rounding of a point with |q| about 1, patch units: a point so near its ray is on it. A step from a larger residual
 // ends within its square times the leaf's curvature: from kLargestLastResidual within 6e-8, below rounding.
