@@ -27,7 +27,4 @@ void derive_sdf(PackImage& image);
 /// texels on the surface. Bytes are texels here: what rows padded to whole words take beyond H_i^2 comes on top.
 void allocate_trim_memory(PackImage& image, double total_bytes, const TrimTextureOptions& options);
 
-/// Bytes the model's trims take in the kd-tree baseline, the unit of `--trim-memory 50%`.
-double kd_trim_bytes(const PackImage& image);
-
 } // namespace trimray

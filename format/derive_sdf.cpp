@@ -179,16 +179,4 @@ void allocate_trim_memory(PackImage& image, double total_bytes, const TrimTextur
     }
 }
 
-double kd_trim_bytes(const PackImage& image)
-{
-    // After Sloup & Havran 2021: each monotone piece keeps control points of its own (2 or 4, 8 bytes each); the planes
-    // of the tree cut a piece about once, so a piece has 2 references (4 bytes) and 2 nodes (8 bytes) to itself.
-    constexpr double kReferencesAndNodes = 2 * 4 + 2 * 8;
-    double bytes = 0;
-    for (const FaceRecord& face : image.faces)
-        for (uint i = 0; i < face.piece_count; ++i)
-            bytes += kReferencesAndNodes + ((image.trim_pieces[face.first_piece + i] & kPieceCubic) != 0 ? 32 : 16);
-    return bytes;
-}
-
 } // namespace trimray

@@ -1,5 +1,6 @@
 #include "preprocess/build_pack.h"
 
+#include "format/derive_kd.h"
 #include "preprocess/bezier_patch.h"
 #include "preprocess/proxy_mesh.h"
 

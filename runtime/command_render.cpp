@@ -74,7 +74,9 @@ Json report_json(const RenderArguments& arguments, PictureSize size, const PackI
     report["closest"] = arguments.closest;
     report["ms_per_frame"] = {{"median", median}, {"min", ms.front()}, {"max", ms.back()}};
     report["rays_per_second"] = static_cast<double>(work.rays) / (median * 1e-3);
-    report["bytes"] = to_json(memory_bytes(image));
+    MemoryBytes bytes = memory_bytes(image);
+    bytes.trim_kd = stats.kd_bytes;
+    report["bytes"] = to_json(bytes);
     report["effects"] = Json::array();
     RenderOptions traced = options;
     traced.trim = stats.trim;

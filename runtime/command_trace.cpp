@@ -33,7 +33,8 @@ Result<std::array<double, 3>> parse_vector(const std::string& option, const std:
 
 const Choice& trim_choice()
 {
-    static const Choice choice{"--trim", {"auto", "exact", "hybrid", "sdf", "kd"}, {"auto", "exact", "hybrid", "sdf"}};
+    static const Choice choice{
+        "--trim", {"auto", "exact", "hybrid", "sdf", "kd"}, {"auto", "exact", "hybrid", "sdf", "kd"}};
     return choice;
 }
 
@@ -74,6 +75,8 @@ TrimMode trim_mode(const std::string& name)
         return TrimMode::Sdf;
     if (name == "hybrid")
         return TrimMode::Hybrid;
+    if (name == "kd")
+        return TrimMode::Kd;
     assert(name == "auto" && "checked against trim_choice()");
     return TrimMode::Auto;
 }

@@ -6,6 +6,7 @@
 #define TRIMRAY_CPU_FETCH_H
 #endif
 
+#include "format/derive_kd.h"
 #include "format/pack_image.h"
 #include "shaders/shared/language.h"
 
@@ -17,12 +18,13 @@ struct FetchSource {
     const CellEntry* cell_entries;
     const float* trim_points;
     const uint* sdf_words;
+    const KdTrims* kd; // null unless the trim mode is kd
 };
 
-static inline FetchSource fetch_source(const PackImage& image)
+static inline FetchSource fetch_source(const PackImage& image, const KdTrims* kd)
 {
-    return {image.control_points.data(), image.cells.data(), image.cell_entries.data(), image.trim_points.data(),
-            image.sdf_words.data()};
+    return {image.control_points.data(), image.cells.data(),     image.cell_entries.data(),
+            image.trim_points.data(),    image.sdf_words.data(), kd};
 }
 
 FN scalar fetch_control(FETCH_PARAM uint index)
@@ -49,6 +51,11 @@ FN scalar2 fetch_trim_point(FETCH_PARAM uint index)
 FN integer fetch_sdf_word(FETCH_PARAM integer index)
 {
     return gather(source.sdf_words, index);
+}
+FN scalar2 fetch_kd_point(FETCH_PARAM uint index)
+{
+    const float* p = source.kd->points.data() + 2 * std::size_t(index);
+    return scalar2(p[0], p[1]);
 }
 
 SHARED_CLOSE

@@ -22,14 +22,14 @@ void trace_block(const BlockJob& job, const Block& block, BlockScratch& scratch,
 HWY_ATTR void answer_trims(const CpuScene& scene, TrimMode trim, std::span<const TrimQueries> queries,
                            std::span<uint16_t> inside)
 {
-    const FetchSource source = fetch_source(scene.image);
+    const FetchSource source = fetch_source(scene.image, trim == TrimMode::Kd ? &*scene.kd_trims() : nullptr);
     uint64_t curve_tests = 0;
     for (size_t i = 0; i < queries.size(); ++i) {
         const TrimQueries& q = queries[i];
         const mask asked = (integer(q.asked) >> load(kLaneNumbers) & integer(1u)) != integer(0u);
         const real2 uv(load(q.u), load(q.v));
         const FaceRecord& face = scene.image.faces[q.face];
-        inside[i] = static_cast<uint16_t>(lane_bits(inside_trims(source, trim, face, uv, asked, curve_tests)));
+        inside[i] = static_cast<uint16_t>(lane_bits(inside_trims(source, trim, q.face, face, uv, asked, curve_tests)));
     }
 }
 

@@ -67,6 +67,7 @@ struct BlockJob {
     TrimMode trim; // not auto
     bool shade;
     float error_px;
+    const KdTrims* kd = nullptr;              // TrimMode::Kd has them
     const TrimReference* reference = nullptr; // TrimMode::Reference has one
     bool record_trim_queries = false;
     const EdgeJob* edges = nullptr; // null: nobody asks for borders
@@ -80,7 +81,7 @@ using TraceBlock = void (*)(const BlockJob& job, const Block& block, BlockScratc
 TraceBlock find_trace_block(const std::string& instruction_set, std::string& found);
 
 /// Answers queries[i] in the mode `trim` (not auto, not reference), as tracing does, into inside[i]; bits of lanes that
-/// do not ask mean nothing. Shapes: as many of one as of the other.
+/// do not ask mean nothing. Shapes: as many of one as of the other. Domain: a mode that CpuTracer would not refuse.
 using AnswerTrims = void (*)(const CpuScene& scene, TrimMode trim, std::span<const TrimQueries> queries,
                              std::span<uint16_t> inside);
 AnswerTrims find_answer_trims(const std::string& instruction_set);

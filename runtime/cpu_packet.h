@@ -32,7 +32,7 @@ class BlockTracer {
 public:
     BlockTracer(const BlockJob& job, BlockScratch& scratch, Frame& frame, WorkCounts& work)
         : job_(job), scratch_(scratch), frame_(frame), work_(work), image_(job.scene.image),
-          source_(fetch_source(job.scene.image)), edges_(job, scratch, source_, work)
+          source_(fetch_source(job.scene.image, job.kd)), edges_(job, scratch, source_, work)
     {
     }
 
@@ -349,9 +349,10 @@ private:
         if (!any_lane(taken))
             return;
         if ((target.face.flags & kFaceNaturalBorder) == 0) {
-            taken = taken && (job_.reference != nullptr
-                                  ? inside_by_reference(job_, target.patch.face, uv, taken, scratch_)
-                                  : inside_trims(source_, job_.trim, target.face, uv, taken, work_.curve_tests));
+            taken =
+                taken && (job_.reference != nullptr ? inside_by_reference(job_, target.patch.face, uv, taken, scratch_)
+                                                    : inside_trims(source_, job_.trim, target.patch.face, target.face,
+                                                                   uv, taken, work_.curve_tests));
             if (!any_lane(taken))
                 return;
         }

@@ -76,8 +76,11 @@ public:
             return drawable.error();
         if (edge_query(options).any() && has_effects(options) && !border_cells_)
             border_cells_ = make_border_cells(scene_->pack.image);
+        if (*trim == TrimMode::Kd && !cpu_scene_->kd_trims().ok())
+            return cpu_scene_->kd_trims().error();
         stats.device = name_;
         stats.trim = *trim;
+        stats.kd_bytes = *trim == TrimMode::Kd ? cpu_scene_->kd_trims()->size_bytes() : 0;
         stats.frame_ms.clear();
         stats.trim_queries.clear();
         if (*trim == TrimMode::Reference && reference_ == nullptr)
@@ -104,6 +107,8 @@ private:
         const View view = make_view(cpu_scene_->image, camera_rays(options.camera, options.width, options.height),
                                     options.width, options.height);
         BlockJob job{*cpu_scene_, view, options.width, options.height, trim, options.shade, options.error_px};
+        if (trim == TrimMode::Kd)
+            job.kd = &*cpu_scene_->kd_trims();
         if (trim == TrimMode::Reference) {
             job.reference = reference_.get();
             job.record_trim_queries = options.record_trim_queries;

@@ -7,6 +7,7 @@
 #endif
 
 #include "runtime/cpu_fetch.h"
+#include "runtime/cpu_trim_kd.h"
 #include "runtime/tracer.h"
 #include "shaders/shared/trim_lookup.h"
 
@@ -78,9 +79,11 @@ FN mask inside_hybrid(const FetchSource& source, const FaceRecord& face, real2 u
 
 /// Lanes of `asked` that lie inside the trims of a face that has some. uv in [0, kUvBelowOne] in those lanes; the
 /// answer of other lanes means nothing. `mode` is not auto, and the pack holds what it reads (choose_trim).
-FN_LARGE mask inside_trims(const FetchSource& source, TrimMode mode, const FaceRecord& face, real2 uv, mask asked,
-                           uint64_t& curve_tests)
+FN_LARGE mask inside_trims(const FetchSource& source, TrimMode mode, uint face_id, const FaceRecord& face, real2 uv,
+                           mask asked, uint64_t& curve_tests)
 {
+    if (mode == TrimMode::Kd)
+        return inside_kd(source, source.kd->faces[face_id], uv, asked, curve_tests);
     // a face without pieces has neither cells nor texture, and no inside
     if ((mode != TrimMode::Sdf && face.grid == 0) || (mode != TrimMode::Exact && face.sdf_size == 0))
         return mask(false);

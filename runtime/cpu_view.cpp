@@ -254,6 +254,12 @@ size_t CpuScene::bytes() const
            shared_patch.size();
 }
 
+const Result<KdTrims>& CpuScene::kd_trims() const
+{
+    std::call_once(kd_once_, [this] { kd_.emplace(derive_kd(image)); });
+    return *kd_;
+}
+
 View make_view(const PackImage& image, const CameraRays& rays, uint32_t width, uint32_t height)
 {
     View view;

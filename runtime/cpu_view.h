@@ -6,12 +6,15 @@
 // steps are scaled by 1 / k so that |w0| = 1 again, and tau_part = k tau. See shaders/shared/precision.h.
 #pragma once
 
+#include "format/derive_kd.h"
 #include "format/pack_image.h"
 #include "runtime/camera.h"
 #include "runtime/tracer.h"
 
 #include <array>
 #include <cstdint>
+#include <mutex>
+#include <optional>
 #include <vector>
 
 namespace trimray {
@@ -31,6 +34,13 @@ struct CpuScene {
     std::vector<uint8_t> left_handed;  // patches whose axes are a mirror image
     std::vector<uint8_t> shared_patch; // native patches with several leaves
     size_t bytes() const;
+
+    /// The kd-trees of the pack's trims, built when first asked for. Fails: as derive_kd.
+    const Result<KdTrims>& kd_trims() const;
+
+private:
+    mutable std::once_flag kd_once_;
+    mutable std::optional<Result<KdTrims>> kd_;
 };
 
 /// The view seen from one instance's part.

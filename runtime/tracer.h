@@ -91,6 +91,7 @@ struct RenderStats {
     std::vector<double> frame_ms; // tracing and shading, not loading or compiling
     WorkCounts work;              // of one frame
     TrimMode trim = TrimMode::Exact;
+    uint64_t kd_bytes = 0;                 // of the kd-trees, in the mode kd; otherwise there are none
     std::vector<TrimQueries> trim_queries; // of one frame, if asked for; on one thread in the order in which they came
 };
 

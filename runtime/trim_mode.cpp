@@ -28,13 +28,11 @@ const char* trim_name(TrimMode mode)
 Result<TrimMode> choose_trim(const PackImage& image, TrimMode wanted)
 {
     const TrimMode mode = wanted == TrimMode::Auto ? TrimMode::Exact : wanted;
-    if (mode == TrimMode::Reference)
+    if (mode == TrimMode::Reference || mode == TrimMode::Kd)
         return mode;
     const auto refusal = [mode](const std::string& detail) {
         return Error{ErrorCode::UnsupportedPackFeature, fmt::format("--trim {}", trim_name(mode)), detail};
     };
-    if (mode == TrimMode::Kd)
-        return refusal("is not in this version; use --trim exact");
     // a face without pieces has no inside in any mode, and needs neither cells nor texture to say so
     const auto faces_without = [&image](uint FaceRecord::*data) {
         return std::count_if(image.faces.begin(), image.faces.end(), [data](const FaceRecord& face) {

@@ -109,6 +109,25 @@ struct Linear {
     Vec3 operator()(const Vec3& v) const { return {dot(row[0], v), dot(row[1], v), dot(row[2], v)}; }
 };
 
+// An array of the pack, or made from it, on its way to the device.
+struct Array {
+    uint32_t binding;
+    std::span<const std::byte> bytes;
+    const char* name;
+};
+
+Status upload_arrays(VulkanDevice& device, std::span<const Array> arrays,
+                     std::array<VulkanBuffer, kFrameBindings>& buffers)
+{
+    for (const Array& array : arrays) {
+        Result<VulkanBuffer> buffer = upload_storage(device, array.bytes, array.name);
+        if (!buffer)
+            return buffer.error();
+        buffers[array.binding] = std::move(*buffer);
+    }
+    return Done{};
+}
+
 } // namespace
 
 SceneFacts scene_facts(const PackImage& image)
@@ -145,11 +164,6 @@ Result<std::array<VulkanBuffer, kFrameBindings>> upload_scene(VulkanDevice& devi
     std::vector<BvhNode> part_nodes = image.part_nodes;
     part_nodes.push_back(empty_node()); // for parts without any, see frame_setup
 
-    struct Array {
-        uint32_t binding;
-        std::span<const std::byte> bytes;
-        const char* name;
-    };
     const Array arrays[] = {
         {kBindTopNodes, bytes_of(top_nodes), "the top tree"},
         {kBindPartNodes, bytes_of(part_nodes), "the parts' trees"},
@@ -163,13 +177,20 @@ Result<std::array<VulkanBuffer, kFrameBindings>> upload_scene(VulkanDevice& devi
         {kBindSdfWords, bytes_of(image.sdf_words), "the distance textures"},
     };
     std::array<VulkanBuffer, kFrameBindings> buffers;
-    for (const Array& array : arrays) {
-        Result<VulkanBuffer> buffer = upload_storage(device, array.bytes, array.name);
-        if (!buffer)
-            return buffer.error();
-        buffers[array.binding] = std::move(*buffer);
-    }
+    if (const Status uploaded = upload_arrays(device, arrays, buffers); !uploaded)
+        return uploaded.error();
     return buffers;
+}
+
+Status upload_kd(VulkanDevice& device, const KdTrims& kd, std::array<VulkanBuffer, kFrameBindings>& buffers)
+{
+    const Array arrays[] = {
+        {kBindKdNodes, bytes_of(kd.nodes), "the kd-trees' nodes"},
+        {kBindKdRuns, bytes_of(kd.runs), "the kd-trees' runs"},
+        {kBindKdPoints, bytes_of(kd.points), "the kd-trees' points"},
+        {kBindKdFaces, bytes_of(kd.faces), "the faces' kd-trees"},
+    };
+    return upload_arrays(device, arrays, buffers);
 }
 
 Result<FrameSetup> frame_setup(const PackImage& image, const RenderOptions& options)

@@ -1,6 +1,7 @@
 // A scene's arrays on a Vulkan device, and the facts to which the shader is specialised.
 #pragma once
 
+#include "format/derive_kd.h"
 #include "format/result.h"
 #include "runtime/camera.h"
 #include "runtime/tracer.h"
@@ -26,6 +27,9 @@ SceneFacts scene_facts(const PackImage& image);
 /// The pack's arrays by binding (shaders/frame_layout.h); the bindings of a frame's own buffers stay empty.
 /// Fails: DeviceFailed.
 Result<std::array<VulkanBuffer, kFrameBindings>> upload_scene(VulkanDevice& device, const PackImage& image);
+
+/// The kd-trees' arrays by binding, beside those: all of one element if there are no trees. Fails: DeviceFailed.
+Status upload_kd(VulkanDevice& device, const KdTrims& kd, std::array<VulkanBuffer, kFrameBindings>& buffers);
 
 /// The view of a frame and its instances as the shader wants them, computed in double.
 struct FrameSetup {

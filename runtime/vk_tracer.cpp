@@ -67,6 +67,7 @@ public:
 private:
     using Specialisation = std::array<uint32_t, kFrameSpecs>;
 
+    Status upload_trims(TrimMode trim);
     Result<ComputePipeline*> pipeline(TrimMode trim, bool shade, bool count, bool edges);
     Status prepare_frame(const FrameSetup& setup, uint32_t rows_per_band);
     Status prepare_edges(const RenderOptions& options, uint32_t rows_per_band);
@@ -87,6 +88,7 @@ private:
     std::unique_ptr<VulkanDevice> device_; // first: everything below must be gone before it
     std::shared_ptr<const Scene> scene_;
     SceneFacts facts_;
+    size_t kd_bytes_ = 0; // of the kd-trees on the device; 0: none yet
     std::array<VulkanBuffer, kFrameBindings> buffers_;
     VulkanBuffer readback_;       // of a band's pixels
     VulkanBuffer edges_readback_; // of a band's edge words
@@ -105,6 +107,8 @@ Status VulkanTracer::upload()
     if (!buffers)
         return buffers.error();
     buffers_ = std::move(*buffers);
+    if (const Status bound = upload_kd(*device_, KdTrims{}, buffers_); !bound)
+        return bound.error();
     const size_t count_bytes = kFrameCounts * 2 * sizeof(uint32_t);
     Result<VulkanBuffer> counts = VulkanBuffer::create(*device_, BufferUse::Storage, count_bytes, "the work counts");
     if (!counts)
@@ -138,11 +142,26 @@ Status VulkanTracer::upload()
     return device_->validation_status();
 }
 
+// Builds and uploads what a trim mode reads beside the pack, when it is first asked for.
+Status VulkanTracer::upload_trims(TrimMode trim)
+{
+    if (trim != TrimMode::Kd || kd_bytes_ > 0)
+        return Done{};
+    const Result<KdTrims> kd = derive_kd(scene_->pack.image);
+    if (!kd)
+        return kd.error();
+    if (const Status uploaded = upload_kd(*device_, *kd, buffers_); !uploaded)
+        return uploaded.error();
+    kd_bytes_ = kd->size_bytes();
+    return Done{};
+}
+
 Result<ComputePipeline*> VulkanTracer::pipeline(TrimMode trim, bool shade, bool count, bool edges)
 {
     Specialisation constants{};
     constants[kSpecTrimMode] = trim == TrimMode::Sdf      ? kTrimByTexture
                                : trim == TrimMode::Hybrid ? kTrimByBoth
+                               : trim == TrimMode::Kd     ? kTrimByKd
                                                           : kTrimByCells;
     constants[kSpecKinds] = facts_.kinds;
     constants[kSpecFeatures] =
@@ -458,6 +477,8 @@ Result<Frame> VulkanTracer::render(const RenderOptions& options, RenderStats& st
     const auto rows_per_band = static_cast<uint32_t>(std::min<size_t>(
         {options.height, band_bytes / row_bytes, size_t{limits.maxComputeWorkGroupCount[1]} * kGroupSide}));
 
+    if (const Status ready = upload_trims(*trim); !ready)
+        return ready.error();
     const Result<FrameSetup> setup = frame_setup(scene_->pack.image, options);
     if (!setup)
         return setup.error();
@@ -503,6 +524,7 @@ Result<Frame> VulkanTracer::render(const RenderOptions& options, RenderStats& st
     stats = RenderStats{};
     stats.device = device_->name();
     stats.trim = *trim;
+    stats.kd_bytes = *trim == TrimMode::Kd ? kd_bytes_ : 0;
     for (uint32_t i = 0; i < frames; ++i) {
         // a software driver's frames are always read: only that shows what must be traced again
         const bool read = i + 1 == frames || device_->is_software() || has_effects(options);

@@ -89,6 +89,7 @@ TRIMRAY_CONST uint kFrameSpecs = 6u;
 TRIMRAY_CONST uint kTrimByCells = 0u;
 TRIMRAY_CONST uint kTrimByTexture = 1u;
 TRIMRAY_CONST uint kTrimByBoth = 2u; // the cell's class, the texture outside its band, the pieces inside
+TRIMRAY_CONST uint kTrimByKd = 3u;
 
 TRIMRAY_CONST uint kFeatureTrims = 1u;    // some face has trims
 TRIMRAY_CONST uint kFeatureRational = 2u; // some Bezier patch is rational
@@ -115,7 +116,12 @@ TRIMRAY_CONST uint kBindCounts = 12u;
 TRIMRAY_CONST uint kBindRetries = 13u;
 TRIMRAY_CONST uint kBindBorders = 14u; // BorderCells (runtime/border_cells.h)
 TRIMRAY_CONST uint kBindEdges = 15u;   // two edge words a pixel: line, border
-TRIMRAY_CONST uint kFrameBindings = 16u;
+// of one element where the trim mode is not kd
+TRIMRAY_CONST uint kBindKdNodes = 16u;
+TRIMRAY_CONST uint kBindKdRuns = 17u;
+TRIMRAY_CONST uint kBindKdPoints = 18u;
+TRIMRAY_CONST uint kBindKdFaces = 19u;
+TRIMRAY_CONST uint kFrameBindings = 20u;
 
 #ifdef __cplusplus
 static_assert(sizeof(FrameView) == 108);

@@ -1,6 +1,7 @@
 // A ray against one leaf: into the patch's space, the leaf's box, the roots, the face's domain and its trims.
 
 const float kBoxMargin = 1e-6f;                    // patch units: the ray's rounding, and the box's
+const uint kRunIterations = 24u + 27u;             // bound of kd_crossed: bisections, halvings of a run
 const uint kCurveIterations = 32u;                 // bound of left_of_cubic
 const uint kTorusIterations = 3u * 24u + 4u * 32u; // bound of torus_roots
 
@@ -57,10 +58,50 @@ PatchRay patch_ray(FrameInstance instance, PatchRecord patch, vec2 pixel)
     return ray;
 }
 
-bool inside_trims(FaceRecord face, vec2 uv)
+// crossed(run) of format/kd_layout.h. `first_point` is the run's.
+bool kd_crossed(uint first_point, KdRun run, vec2 uv)
+{
+    uint stride = kd_stride(run);
+    vec2 a = fetch_kd_point(first_point);
+    vec2 b = fetch_kd_point(first_point + run.piece_count * stride);
+    if (!kd_in_box(a, b, uv))
+        return kd_crossed_beside(run, a, b, uv);
+    return kd_left_of_piece(first_point + kd_piece_at(first_point, stride, run.piece_count, uv.y) * stride,
+                            (run.word & kKdRunCubic) != 0u, uv, true);
+}
+
+bool inside_kd(KdFace face, vec2 uv)
+{
+    KdNode node = kd_nodes[face.first_node];
+    for (uint depth = 1u; depth < kMaxKdDepth && !kd_is_leaf(node); ++depth) {
+        bool beyond = (kd_splits_v(node) ? uv.y : uv.x) >= uintBitsToFloat(node.data);
+        node = kd_nodes[face.first_node + kd_number(node) + (beyond ? 1u : 0u)];
+        ++iterations;
+    }
+    bool inside = (node.word & kKdInside) != 0u;
+    bool single = (node.word & kKdKindMask) == kKdLeafRun;
+    uint run_count = kd_run_count(node);
+    for (uint i = 0u; i < run_count; ++i) {
+        KdRun run = KdRun(node.data, kd_number(node));
+        if (!single)
+            run = kd_runs[face.first_run + node.data + i];
+        inside = differ(inside, kd_crossed(face.first_point + (run.word >> kKdPointShift), run, uv));
+        ++curve_tests;
+        iterations += 1u + kRunIterations;
+        if (iteration_limit > 0u && iterations > kRoundIterations) {
+            overrun = true;
+            return false;
+        }
+    }
+    return inside;
+}
+
+bool inside_trims(uint face_id, FaceRecord face, vec2 uv)
 {
     if (!has_feature(kFeatureTrims) || (face.flags & kFaceNaturalBorder) != 0u)
         return true;
+    if (trim_mode == kTrimByKd)
+        return inside_kd(kd_faces[face_id], uv);
     // a face without pieces has neither cells nor texture, and no inside
     if ((trim_mode != kTrimByTexture && face.grid == 0u) || (trim_mode != kTrimByCells && face.sdf_size == 0u))
         return false;
@@ -102,7 +143,8 @@ bool in_range(PatchRay ray, float t, Hit hit)
 
 // Takes the root at t if it is in the face's domain, inside its trims and nearer than what was found. Of two hits
 // within rounding the one of the lower instance and leaf stays, whatever the order.
-void offer(PatchRay ray, FaceRecord face, uint leaf, uint instance, float t, vec2 uv_patch, vec2 uv_face, inout Hit hit)
+void offer(PatchRay ray, uint face_id, FaceRecord face, uint leaf, uint instance, float t, vec2 uv_patch, vec2 uv_face,
+           inout Hit hit)
 {
     vec2 off = abs(uv_face - 0.5f);
     if (max(off.x, off.y) > 0.5f + kDomainSlack)
@@ -112,7 +154,7 @@ void offer(PatchRay ray, FaceRecord face, uint leaf, uint instance, float t, vec
     if (!(past < hit.past + (first ? ray.slack : -ray.slack)))
         return;
     vec2 uv = clamp(uv_face, vec2(0.0f), vec2(kUvBelowOne));
-    if (!inside_trims(face, uv))
+    if (!inside_trims(face_id, face, uv))
         return;
     hit.past = past;
     hit.t = t;
@@ -173,7 +215,7 @@ void native_hit(PatchRay ray, PatchRecord patch, FaceRecord face, uint kind, uin
         if (!in_range(ray, roots[i], hit))
             continue;
         vec2 uv_patch = native_uv(kind, patch, ray.origin + roots[i] * ray.direction);
-        offer(ray, face, leaf, instance, roots[i], uv_patch, face_uv(patch, kind, uv_patch), hit);
+        offer(ray, patch.face, face, leaf, instance, roots[i], uv_patch, face_uv(patch, kind, uv_patch), hit);
     }
     iterations += 4u;
 }
@@ -218,7 +260,7 @@ bool newton_from(PatchRay ray, PatchRecord patch, FaceRecord face, LeafBox box, 
             // not `precise`: glslc follows precise values around this loop for ever
             float t = dot(s.p - ray.origin, ray.direction) / dot(ray.direction, ray.direction);
             if (next.residual <= max(newton.enough, kSmallResidual) && in_range(ray, t, hit))
-                offer(ray, face, leaf, instance, t, uv, face_uv(patch, kKindBezier, uv), hit);
+                offer(ray, patch.face, face, leaf, instance, t, uv, face_uv(patch, kKindBezier, uv), hit);
             return grazing;
         }
         ++newton_steps;

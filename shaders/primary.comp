@@ -6,6 +6,7 @@
 #extension GL_KHR_shader_subgroup_arithmetic : require
 #extension GL_KHR_shader_subgroup_basic : require
 
+#include "format/kd_layout.h"
 #include "shaders/frame_layout.h"
 // first: the formulas fetch through it, and they make `scalar`, a layout there, a type
 #include "shaders/scene_buffers.glsl"
@@ -20,6 +21,7 @@
 #include "shaders/shared/quadric.h"
 #include "shaders/shared/shading.h"
 #include "shaders/shared/torus.h"
+#include "shaders/shared/trim_kd.h"
 #include "shaders/shared/trim_lookup.h"
 
 #include "shaders/leaf_hit.glsl"

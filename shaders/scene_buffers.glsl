@@ -15,6 +15,10 @@ layout(scalar, set = 0, binding = kBindCounts) buffer Counts { uint counts[]; };
 layout(scalar, set = 0, binding = kBindRetries) readonly buffer Retries { uint retries[]; };
 layout(scalar, set = 0, binding = kBindBorders) readonly buffer Borders { uint border_words[]; };
 layout(scalar, set = 0, binding = kBindEdges) writeonly buffer Edges { uvec2 edges[]; };
+layout(scalar, set = 0, binding = kBindKdNodes) readonly buffer KdNodes { KdNode kd_nodes[]; };
+layout(scalar, set = 0, binding = kBindKdRuns) readonly buffer KdRuns { KdRun kd_runs[]; };
+layout(scalar, set = 0, binding = kBindKdPoints) readonly buffer KdPoints { vec2 kd_points[]; };
+layout(scalar, set = 0, binding = kBindKdFaces) readonly buffer KdFaces { KdFace kd_faces[]; };
 layout(scalar, push_constant) uniform View { FrameView view; };
 
 // Specialised to what the pack holds and the frame asks for: what is false here costs no instruction.
@@ -41,6 +45,7 @@ uint fetch_entry_word(uint at) { return cell_entries[at].word; }
 float fetch_entry_eta(uint at) { return cell_entries[at].eta; }
 vec2 fetch_trim_point(uint at) { return trim_points[at]; }
 uint fetch_sdf_word(uint at) { return sdf_words[at]; }
+vec2 fetch_kd_point(uint at) { return kd_points[at]; }
 
 vec3 vector(float v[3]) { return vec3(v[0], v[1], v[2]); }
 bool has_kind(uint kind) { return (kinds & (1u << kind)) != 0u; }

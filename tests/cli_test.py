@@ -314,6 +314,20 @@ class Render(CliTest):
         self.assertGreater(report["work"]["leaf_visits"], 0)
         self.assertTrue(all(isinstance(name, str) for name in report["effects"]))
 
+    def test_kd_trims_show_what_exact_ones_show_and_count_their_bytes(self):
+        reports, pictures = {}, {}
+        for trim in ["exact", "kd"]:
+            out = WORK / f"{trim}_trims.png"
+            reports[trim] = self.json_of("render", PACK, "-o", out, "--size", "64x48", "--device", "cpu", "--trim", trim,
+                                         "--json")
+            pictures[trim] = out.read_bytes()
+        self.assertEqual(pictures["exact"], pictures["kd"])
+        self.assertEqual(reports["kd"]["trim"], "kd")
+        self.assertIn("trim-kd", reports["kd"]["effects"])
+        self.assertEqual(reports["exact"]["bytes"]["trim_kd"], 0)
+        self.assertGreater(reports["kd"]["bytes"]["trim_kd"], 0)
+        self.assertEqual(sum(reports["kd"]["bytes"].values()), 2 * reports["kd"]["bytes"]["total"])
+
     def test_png_shows_the_model_whole_on_nothing(self):
         width, height, rows = read_png(self.render("b.png", "--size", "80x60"))
         self.assertEqual((width, height), (80, 60))
@@ -370,9 +384,9 @@ class Render(CliTest):
         self.assertNotIn("llvmpipe", device, "never a software driver unasked")
 
     def test_modes_that_do_not_exist_name_those_that_do(self):
-        for option, value in [("--trim", "kd"), ("--closest", "stochastic"), ("--scene", "a.json")]:
+        for option, value in [("--closest", "stochastic"), ("--scene", "a.json")]:
             self.fails(4, "render", PACK, "-o", WORK / "f.png", option, value, says=[option])
-        self.fails(4, "render", PACK, "-o", WORK / "f.png", "--trim", "kd", says=["auto, exact, hybrid, sdf"])
+        self.fails(4, "render", PACK, "-o", WORK / "f.png", "--closest", "stochastic", says=["certified"])
         self.fails(4, "render", PACK, "-o", WORK / "f.jpg", says=["f.jpg", ".png", ".exr"])
         self.assertFalse((WORK / "f.png").exists())
 

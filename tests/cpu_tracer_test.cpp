@@ -1,4 +1,5 @@
 // The CPU tracer against the surfaces themselves, evaluated in double, and against itself on every instruction set.
+#include "format/derive_kd.h"
 #include "format/record_surface.h"
 #include "format/trim_query.h"
 #include "runtime/tracer.h"
@@ -111,7 +112,7 @@ TEST(cpu_tracer, gives_the_same_bits_on_every_instruction_set)
     for (const char* set : {"avx512", "avx2", "sse4"}) {
         if (!make_cpu_tracer(scene, set).ok())
             continue;
-        for (const TrimMode trim : {TrimMode::Exact, TrimMode::Sdf, TrimMode::Hybrid}) {
+        for (const TrimMode trim : {TrimMode::Exact, TrimMode::Sdf, TrimMode::Hybrid, TrimMode::Kd}) {
             const Traced base = render(scene, kOverview, 157, 93, trim);
             const Traced other = render(scene, kOverview, 157, 93, trim, set);
             EXPECT_TRUE(same_bits(base.frame.rgba, other.frame.rgba)) << set;
@@ -288,6 +289,63 @@ TEST(cpu_tracer, hybrid_trims_answer_as_exact_ones)
     }
 }
 
+TEST(cpu_tracer, kd_trims_answer_as_exact_ones_with_fewer_tests)
+{
+    const auto scene = all_kinds().finish();
+    for (const Camera& camera : {kOverview, looking({2, -6, 8}, {2, -1, 0}, 30)}) {
+        const Traced exact = render(scene, camera, 320, 240);
+        const Traced kd = render(scene, camera, 320, 240, TrimMode::Kd);
+        EXPECT_EQ(kd.stats.trim, TrimMode::Kd);
+        EXPECT_EQ(exact.stats.kd_bytes, 0u);
+        EXPECT_EQ(double(kd.stats.kd_bytes), kd_trim_bytes(scene->pack.image));
+        EXPECT_TRUE(same_bits(exact.frame.face, kd.frame.face));
+        EXPECT_TRUE(same_bits(exact.frame.depth_mm, kd.frame.depth_mm));
+        EXPECT_GT(kd.stats.work.curve_tests, 0u);
+        EXPECT_LT(kd.stats.work.curve_tests, exact.stats.work.curve_tests);
+    }
+}
+
+TEST(cpu_tracer, kd_trims_need_neither_cells_nor_textures)
+{
+    const auto whole = all_kinds().finish();
+    Scene bare;
+    bare.pack.image = whole->pack.image;
+    for (FaceRecord& face : bare.pack.image.faces)
+        face.grid = face.sdf_size = 0;
+    bare.pack.image.cells.clear();
+    bare.pack.image.cell_entries.clear();
+    bare.pack.image.sdf_words.clear();
+    const Traced with = render(whole, kOverview, 160, 120, TrimMode::Kd);
+    const Traced without = render(std::make_shared<const Scene>(bare), kOverview, 160, 120, TrimMode::Kd);
+    EXPECT_TRUE(same_bits(with.frame.face, without.frame.face));
+}
+
+TEST(cpu_tracer, refuses_kd_trims_of_faces_that_share_pieces)
+{
+    const auto whole = all_kinds().finish();
+    Scene shared;
+    shared.pack.image = whole->pack.image;
+    std::vector<FaceRecord>& faces = shared.pack.image.faces;
+    const auto trimmed =
+        std::find_if(faces.begin(), faces.end(), [](const FaceRecord& f) { return f.piece_count > 0; });
+    ASSERT_NE(trimmed, faces.end());
+    for (FaceRecord& face : faces) {
+        face.first_point = trimmed->first_point;
+        face.point_count = trimmed->point_count;
+        face.first_piece = trimmed->first_piece;
+        face.piece_count = trimmed->piece_count;
+    }
+    shared.pack.image.trim_pieces.resize(trimmed->first_piece + trimmed->piece_count);
+    const auto tracer = make_cpu_tracer(std::make_shared<const Scene>(shared));
+    ASSERT_TRUE(tracer.ok());
+    RenderOptions options;
+    options.trim = TrimMode::Kd;
+    RenderStats stats;
+    const Result<Frame> frame = (*tracer)->render(options, stats);
+    ASSERT_FALSE(frame.ok());
+    EXPECT_EQ(frame.error().code, ErrorCode::InvalidPack);
+}
+
 TEST(cpu_tracer, refuses_trim_modes_that_the_pack_has_no_data_for)
 {
     TracedScene scene = all_kinds();
@@ -296,7 +354,7 @@ TEST(cpu_tracer, refuses_trim_modes_that_the_pack_has_no_data_for)
     ASSERT_TRUE(tracer.ok());
     RenderOptions options;
     RenderStats stats;
-    for (const TrimMode mode : {TrimMode::Sdf, TrimMode::Hybrid, TrimMode::Kd}) {
+    for (const TrimMode mode : {TrimMode::Sdf, TrimMode::Hybrid}) {
         options.trim = mode;
         const Result<Frame> frame = (*tracer)->render(options, stats);
         ASSERT_FALSE(frame.ok());

@@ -65,29 +65,33 @@ Queries random_queries(const std::vector<MonotonePiece>& pieces, std::mt19937& r
     return q;
 }
 
-uint inside_bits(const PackImage& image, TrimMode mode, uint face, const Queries& q, uint asked)
+uint inside_bits(const PackImage& image, const KdTrims* kd, TrimMode mode, uint face, const Queries& q, uint asked)
 {
-    const FetchSource source = fetch_source(image);
+    const FetchSource source = fetch_source(image, kd);
     uint64_t curve_tests = 0;
     const mask open = ((integer(asked) >> lane_numbers()) & integer(1u)) != integer(0u);
-    return lane_bits(inside_trims(source, mode, image.faces[face], q.uv(), open, curve_tests)) & asked;
+    return lane_bits(inside_trims(source, mode, face, image.faces[face], q.uv(), open, curve_tests)) & asked;
 }
 
 TEST(cpu_trim, decides_as_a_crossing_count_in_double)
 {
     const PackImage image = random_faces(40);
+    const Result<KdTrims> kd = derive_kd(image);
+    ASSERT_TRUE(kd.ok());
     std::mt19937 random(11);
     size_t asked = 0, near = 0;
     for (uint f = 0; f < image.faces.size(); ++f) {
         const std::vector<MonotonePiece> pieces = pieces_of(image, f);
         for (int i = 0; i < 300; ++i) {
             const Queries q = random_queries(pieces, random, i % 3);
-            const uint exact = inside_bits(image, TrimMode::Exact, f, q, 0xffffu);
-            EXPECT_EQ(exact, inside_bits(image, TrimMode::Hybrid, f, q, 0xffffu)) << "face " << f;
+            const uint exact = inside_bits(image, &*kd, TrimMode::Exact, f, q, 0xffffu);
+            EXPECT_EQ(exact, inside_bits(image, &*kd, TrimMode::Hybrid, f, q, 0xffffu)) << "face " << f;
+            const uint by_kd = inside_bits(image, &*kd, TrimMode::Kd, f, q, 0xffffu);
             for (int k = 0; k < kLanes; ++k) {
                 const double u = double(q.u[k]), v = double(q.v[k]);
                 ++asked;
-                if ((exact >> k & 1u) == uint(exact_inside(pieces, u, v)))
+                const uint expected = uint(exact_inside(pieces, u, v));
+                if ((exact >> k & 1u) == expected && (by_kd >> k & 1u) == expected)
                     continue;
                 ++near;
                 // ulps of uv, and of a piece's extent
@@ -103,16 +107,18 @@ TEST(cpu_trim, decides_as_a_crossing_count_in_double)
 TEST(cpu_trim, a_ray_gets_the_same_answer_in_any_packet)
 {
     const PackImage image = random_faces(12);
+    const Result<KdTrims> kd = derive_kd(image);
+    ASSERT_TRUE(kd.ok());
     std::mt19937 random(5);
     for (uint f = 0; f < image.faces.size(); ++f) {
         const std::vector<MonotonePiece> pieces = pieces_of(image, f);
         for (int i = 0; i < 300; ++i) {
             const Queries q = random_queries(pieces, random, i % 3);
-            for (const TrimMode mode : {TrimMode::Exact, TrimMode::Hybrid}) {
-                const uint together = inside_bits(image, mode, f, q, 0xffffu);
+            for (const TrimMode mode : {TrimMode::Exact, TrimMode::Hybrid, TrimMode::Kd}) {
+                const uint together = inside_bits(image, &*kd, mode, f, q, 0xffffu);
                 uint alone = 0;
                 for (int k = 0; k < kLanes; ++k)
-                    alone |= inside_bits(image, mode, f, q, 1u << k);
+                    alone |= inside_bits(image, &*kd, mode, f, q, 1u << k);
                 ASSERT_EQ(together, alone) << "face " << f;
             }
         }

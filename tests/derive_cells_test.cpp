@@ -1,5 +1,6 @@
 // Cells and their query: the same answer as an exact crossing count, wherever the loop is not within rounding.
 #include "format/derive.h"
+#include "format/derive_kd.h"
 #include "format/trim_query.h"
 #include "tests/trim_shapes.h"
 
@@ -29,19 +30,11 @@ Disagreement compare(const PackImage& image, uint face, size_t count, uint seed)
         float u = uniform(rng), v = uniform(rng);
         switch (i % 6) {
         case 1:
-            u = std::round(u * 64) / 64;
-            v = std::round(v * 64) / 64;
-            break;
-        case 2: { // a height that a piece's end has, and beside the piece
-            const MonotonePiece& p = pieces[rng() % pieces.size()];
-            v = static_cast<float>(p.v[rng() % 2 == 0 ? 0 : 3]);
-            break;
-        }
+        case 2:
         case 3: {
-            const MonotonePiece& p = pieces[rng() % pieces.size()];
-            const double t = uniform(rng);
-            u = static_cast<float>(bezier3(p.u, t)) + 1e-5f * (uniform(rng) - 0.5f);
-            v = static_cast<float>(bezier3(p.v, t)) + 1e-5f * (uniform(rng) - 0.5f);
+            const Uv p = telling_point(rng, pieces, i % 6);
+            u = p.u;
+            v = p.v;
             break;
         }
         case 4: // an ulp or none beside a cell's border
@@ -63,26 +56,6 @@ Disagreement compare(const PackImage& image, uint face, size_t count, uint seed)
         (exact_distance(pieces, u, v) > 1e-6 ? out.wrong_far : out.wrong_near) += 1;
     }
     return out;
-}
-
-std::vector<std::vector<Loop>> named_shapes()
-{
-    const Loop border = polygon({{0, 0}, {1, 0}, {1, 1}, {0, 1}});
-    return {
-        {border, circle(0.5, 0.5, 0.25, 0.25)},
-        {circle(0.5, 0.5, 0.5, 0.5, 3)},
-        {circle(0.5, 0.5, 0.5, 0.5), circle(0.5, 0.5, 0.4, 0.4), circle(0.5, 0.5, 0.3, 0.3),
-         circle(0.5, 0.5, 0.01, 0.2)},
-        {star(0.5, 0.5, 0.5, 0.1, 9)},
-        {gear(0.5, 0.5, 0.49, 0.4, 40)},
-        {border, gear(0.5, 0.5, 0.3, 0.25, 17), star(0.1, 0.1, 0.09, 0.02, 5)},
-        {polygon({{0, 0}, {1, 0}, {1, 1}})},
-        {polygon({{0, 0}, {1, 1}, {1, 0}, {0, 1}})},                                       // figure eight
-        {circle(0.25, 0.5, 0.25, 0.25), circle(0.75, 0.5, 0.25, 0.25)},                    // touching
-        {border, polygon({{0.25f, 0.25f}, {0.5f, 0.25f}, {0.5f, 0.75f}, {0.25f, 0.75f}})}, // on cell borders
-        {polygon({{0, 0}, {1, 0}, {1, 1e-4f}, {0, 3e-5f}}), border},                       // slivers
-        {polygon({{0, 0}, {0.5f, 0}, {0.5f, 0.5f}, {1, 0.5f}, {1, 1}, {0.5f, 1}, {0.5f, 0.5f}, {0, 0.5f}})},
-    };
 }
 
 TEST(derive_cells, answers_as_an_exact_crossing_count_does)

@@ -97,7 +97,7 @@ TEST(reference_mode, the_lanes_answer_recorded_queries_as_they_do_while_tracing)
         const AnswerTrims answer = find_answer_trims(set);
         if (!answer)
             continue;
-        for (const TrimMode mode : {TrimMode::Exact, TrimMode::Hybrid, TrimMode::Sdf}) {
+        for (const TrimMode mode : {TrimMode::Exact, TrimMode::Hybrid, TrimMode::Kd, TrimMode::Sdf}) {
             answer(cpu_scene, mode, queries, inside);
             size_t wrong = 0;
             for (size_t i = 0; i < queries.size(); ++i)

@@ -1,6 +1,7 @@
 // trim_areas FILE...: every face's area from its trims beside the CAD kernel's own (BRepGProp), and what the trims
 // take. A tool for corpora; the kernel's areas share no code with ours.
 #include "format/derive.h"
+#include "format/derive_kd.h"
 #include "format/trim_query.h"
 #include "preprocess/bezier_patch.h"
 #include "preprocess/build_pack.h"

@@ -123,6 +123,27 @@ inline Loop random_loop(std::mt19937& rng, int pieces)
     return loop;
 }
 
+/// Faces' loops that have been, or might be, answered wrongly.
+inline std::vector<std::vector<Loop>> named_shapes()
+{
+    const Loop border = polygon({{0, 0}, {1, 0}, {1, 1}, {0, 1}});
+    return {
+        {border, circle(0.5, 0.5, 0.25, 0.25)},
+        {circle(0.5, 0.5, 0.5, 0.5, 3)},
+        {circle(0.5, 0.5, 0.5, 0.5), circle(0.5, 0.5, 0.4, 0.4), circle(0.5, 0.5, 0.3, 0.3),
+         circle(0.5, 0.5, 0.01, 0.2)},
+        {star(0.5, 0.5, 0.5, 0.1, 9)},
+        {gear(0.5, 0.5, 0.49, 0.4, 40)},
+        {border, gear(0.5, 0.5, 0.3, 0.25, 17), star(0.1, 0.1, 0.09, 0.02, 5)},
+        {polygon({{0, 0}, {1, 0}, {1, 1}})},
+        {polygon({{0, 0}, {1, 1}, {1, 0}, {0, 1}})},                                       // figure eight
+        {circle(0.25, 0.5, 0.25, 0.25), circle(0.75, 0.5, 0.25, 0.25)},                    // touching
+        {border, polygon({{0.25f, 0.25f}, {0.5f, 0.25f}, {0.5f, 0.75f}, {0.25f, 0.75f}})}, // on cell borders
+        {polygon({{0, 0}, {1, 0}, {1, 1e-4f}, {0, 3e-5f}}), border},                       // slivers
+        {polygon({{0, 0}, {0.5f, 0}, {0.5f, 0.5f}, {1, 0.5f}, {1, 1}, {0.5f, 1}, {0.5f, 0.5f}, {0, 0.5f}})},
+    };
+}
+
 /// Appends a face with these loops. extent in mm.
 inline void add_face(PackImage& image, const std::vector<Loop>& loops, float extent_u = 1, float extent_v = 1)
 {
@@ -185,6 +206,24 @@ inline bool exact_inside(const std::vector<MonotonePiece>& pieces, double u, dou
         inside ^= u < p.u_lo() || u < exact_u_at_v(p, v);
     }
     return inside;
+}
+
+/// A random point: 1: at a dyadic place; 2: at a height that a piece's end has; 3: beside a piece; otherwise anywhere.
+inline Uv telling_point(std::mt19937& rng, const std::vector<MonotonePiece>& pieces, size_t kind)
+{
+    std::uniform_real_distribution<float> uniform(0, 1);
+    Uv p{uniform(rng), uniform(rng)};
+    const MonotonePiece& piece = pieces[rng() % pieces.size()];
+    if (kind == 1)
+        p = {std::round(p.u * 64) / 64, std::round(p.v * 64) / 64};
+    if (kind == 2)
+        p.v = static_cast<float>(piece.v[rng() % 2 == 0 ? 0 : 3]);
+    if (kind == 3) {
+        const double t = uniform(rng);
+        p = {static_cast<float>(bezier3(piece.u, t)) + 1e-5f * (uniform(rng) - 0.5f),
+             static_cast<float>(bezier3(piece.v, t)) + 1e-5f * (uniform(rng) - 0.5f)};
+    }
+    return p;
 }
 
 /// Distance from a point to the pieces, in uv scaled by (su, sv). Fine samples, then golden section.

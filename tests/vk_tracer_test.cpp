@@ -1,6 +1,7 @@
 // The Vulkan tracer on whatever driver is there (a software one in CI), with the validation layers, whose messages are
 // errors. The CPU tracer is what it must agree with; where both could be wrong alike, a sphere is computed by hand.
 #include "format/derive.h"
+#include "format/derive_kd.h"
 #include "runtime/tracer.h"
 #include "runtime/vk_buffer.h"
 #include "runtime/vk_device.h"
@@ -149,6 +150,26 @@ TEST_F(vk_tracer, agrees_with_the_cpu_tracer_on_distance_textures)
     expect_agreement(*tracer, scene, options, 2500);
 }
 
+TEST_F(vk_tracer, kd_trims_answer_as_exact_ones_and_as_the_cpu_tracers)
+{
+    const auto scene = trimmed_planes().finish();
+    const auto tracer = make(scene);
+    ASSERT_TRUE(tracer);
+    RenderOptions options = small_picture({8, -16, 20});
+    RenderStats exact_stats, kd_stats;
+    const Frame exact = render(*tracer, options, &exact_stats);
+    EXPECT_EQ(exact_stats.kd_bytes, 0u);
+    options.trim = TrimMode::Kd;
+    const Frame kd = render(*tracer, options, &kd_stats);
+    EXPECT_EQ(exact.face, kd.face);
+    EXPECT_EQ(exact.depth_mm, kd.depth_mm);
+    EXPECT_EQ(kd_stats.trim, TrimMode::Kd);
+    EXPECT_EQ(static_cast<double>(kd_stats.kd_bytes), kd_trim_bytes(scene->pack.image));
+    EXPECT_GT(kd_stats.work.curve_tests, 0u);
+    EXPECT_LT(kd_stats.work.curve_tests, exact_stats.work.curve_tests);
+    expect_agreement(*tracer, scene, options, 2500);
+}
+
 TEST_F(vk_tracer, hybrid_trims_answer_as_exact_ones)
 {
     const auto scene = trimmed_planes().finish();
@@ -270,7 +291,7 @@ TEST_F(vk_tracer, refuses_what_the_pack_has_no_data_for)
     ASSERT_TRUE(tracer);
     RenderOptions options = small_picture({20, -40, 25});
     RenderStats stats;
-    for (const TrimMode mode : {TrimMode::Sdf, TrimMode::Hybrid, TrimMode::Kd, TrimMode::Reference}) {
+    for (const TrimMode mode : {TrimMode::Sdf, TrimMode::Hybrid, TrimMode::Reference}) {
         options.trim = mode;
         const Result<Frame> frame = tracer->render(options, stats);
         ASSERT_FALSE(frame.ok());
