@@ -12,6 +12,7 @@ class App;
 namespace trimray {
 
 void register_render(CLI::App& app, int& exit_code);
+void register_bench(CLI::App& app, int& exit_code);
 void register_export(CLI::App& app, int& exit_code);
 void register_info(CLI::App& app, int& exit_code);
 void register_validate(CLI::App& app, int& exit_code);

@@ -87,7 +87,7 @@ int run(const std::vector<std::string>& arguments)
     for (const ExternalCommand& command : external_commands())
         register_external(app, command);
     for (const auto register_command : {register_render, register_info, register_validate, register_thumbnail,
-                                        register_export, register_preview, register_version})
+                                        register_export, register_preview, register_bench, register_version})
         register_command(app, exit_code);
 
     if (arguments.empty()) {
@@ -113,7 +113,11 @@ int run(const std::vector<std::string>& arguments)
         if (error.get_exit_code() == 0) // --help, --version
             return app.exit(error);
         const CLI::App* command = find_command(app, name);
-        const std::string where = command ? name : "";
+        std::string where = command ? name : "";
+        while (command && !command->get_subcommands().empty()) { // bench trims
+            command = command->get_subcommands().front();
+            where += " " + command->get_name();
+        }
         if (!command) // not a word, so not a command: an option that nobody takes
             return usage_error("", fmt::format("unexpected argument '{}'", name), see_help(""));
         if (dynamic_cast<const CLI::ExtrasError*>(&error))

@@ -20,7 +20,7 @@ from pathlib import Path
 
 TESTS = Path(__file__).resolve().parent
 MODEL = TESTS / "models" / "io1-cm-214.stp"  # 29 faces: planes, cylinders, tori; colours
-COMMANDS = ["pack", "render", "info", "validate", "thumbnail", "export", "preview", "version"]
+COMMANDS = ["pack", "render", "info", "validate", "thumbnail", "export", "preview", "bench", "version"]
 OPTIONS = None  # parsed arguments
 WORK = None  # a temporary folder
 PACK = None  # a valid pack
@@ -489,6 +489,48 @@ class Export(CliTest):
         self.fails(2, "export", WORK / "missing.tray", "-o", WORK / "x.glb", says=["missing.tray"])
         self.fails(2, "export", PACK, "-o", WORK / "no_folder" / "x.glb", says=["no_folder", "No such file"])
         self.assertFalse((WORK / "x.glb").exists())
+
+
+class Bench(CliTest):
+    needs_pack = True
+
+    def test_trims_measures_every_setting(self):
+        report = self.json_of("bench", "trims", PACK, "--json", "--size", "64x48", "--rounds", 2, "--memory", "100,400",
+                              "--views", "front,close-up")
+        self.assertEqual((report["width"], report["height"], report["rounds"], report["threads"]), (64, 48, 2, 1))
+        [measured] = report["packs"]
+        self.assertEqual(measured["pack"], str(PACK))
+        self.assertEqual([view["view"] for view in measured["views"]], ["front", "close-up"])
+        for view in measured["views"]:
+            self.assertEqual(set(view["camera"]), {"eye", "target", "up", "fov"})
+            settings = view["settings"]
+            self.assertEqual([row["mode"] for row in settings], ["kd", "exact", "exact"] + 8 * ["hybrid"] + 8 * ["sdf"])
+            self.assertEqual({(r["source"], r["layout"], r["memory_percent"]) for r in settings[3:]},
+                             {(s, l, m) for s in ["curve", "mask"] for l in ["isotropic", "square"] for m in [100, 400]})
+            self.assertEqual([i for i, row in enumerate(settings) if row["edges"]], [2])
+            self.assertEqual(settings[0]["speed_to_kd"], 1)
+            for row in settings:
+                self.assertGreater(row["frame_ms"], 0)
+                self.assertGreater(row["ns_per_query"], 0)
+                self.assertGreater(row["bytes"], 0)
+                self.assertEqual(row["wrong_rays_per_million"], row["wrong_rays"] / (64 * 48) * 1e6)
+                if row["mode"] != "sdf":
+                    self.assertEqual((row["wrong_rays"], row["wrong_queries"], row["psnr_db"]), (0, 0, None), row)
+
+    def test_trims_prints_a_table(self):
+        text = self.ok("bench", "trims", PACK, "--size", "32x24", "--rounds", 1, "--memory", 100, "--views", "iso").stdout
+        self.assertRegex(text, r"(?m)^kd +\d+ ")
+        self.assertRegex(text, r"(?m)^sdf curve isotropic 100 % +\d+ ")
+        self.assertIn("--eye", text)
+
+    def test_errors_have_their_exit_codes(self):
+        self.fails(1, "bench", says=["bench", "subcommand"])
+        self.fails(1, "bench", "trims", says=["bench trims", "PACK", "trimray bench trims --help"])
+        self.fails(1, "bench", "trims", PACK, "--rouns", "3", says=["bench trims", "did you mean '--rounds'?"])
+        self.fails(1, "bench", "trims", PACK, "--views", "iso,frnt", says=["--views", "frnt", "close-up"])
+        self.fails(1, "bench", "trims", PACK, "--memory", "0", says=["--memory"])
+        self.fails(2, "bench", "trims", WORK / "missing.tray", says=["missing.tray"])
+        self.fails(4, "bench", "trims", PACK, "--instruction-set", "mmx", says=["mmx"])
 
 
 class Pack(CliTest):

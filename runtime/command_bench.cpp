@@ -1,0 +1,199 @@
+#include "runtime/bench_trims.h"
+#include "runtime/command_json.h"
+#include "runtime/command_report.h"
+#include "runtime/command_trace.h"
+#include "runtime/commands.h"
+#include "runtime/trim_mode.h"
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+#include <cmath>
+#include <memory>
+#include <unistd.h>
+
+namespace trimray {
+namespace {
+
+struct BenchArguments {
+    std::vector<std::string> packs;
+    std::string size = "960x540";
+    std::vector<double> memory_percent{50, 100, 200, 400};
+    TrimBenchOptions options;
+    bool json = false;
+};
+
+const char* source_name(TrimSource source)
+{
+    return source == TrimSource::Curve ? "curve" : "mask";
+}
+const char* layout_name(TrimLayout layout)
+{
+    return layout == TrimLayout::Isotropic ? "isotropic" : "square";
+}
+
+double per_million(uint64_t count, uint64_t of)
+{
+    return of > 0 ? 1e6 * static_cast<double>(count) / static_cast<double>(of) : 0;
+}
+
+Json figures_json(const TrimFigures& figures)
+{
+    const TrimSetting& setting = figures.setting;
+    Json row;
+    row["mode"] = trim_name(setting.mode);
+    row["source"] = setting.has_textures() ? Json(source_name(setting.textures.source)) : Json();
+    row["layout"] = setting.has_textures() ? Json(layout_name(setting.textures.layout)) : Json();
+    row["memory_percent"] = setting.has_textures() ? Json(100 * setting.memory) : Json();
+    row["edges"] = setting.edges;
+    row["bytes"] = figures.bytes;
+    row["frame_ms"] = figures.frame_ms;
+    row["speed_to_kd"] = figures.speed_to_kd;
+    row["ns_per_query"] = figures.ns_per_query;
+    row["queries"] = figures.queries;
+    row["wrong_queries"] = figures.wrong_queries;
+    row["wrong_rays"] = figures.errors.wrong_rays;
+    row["wrong_rays_per_million"] = per_million(figures.errors.wrong_rays, figures.errors.rays);
+    row["border_error_px"] = figures.errors.largest_border_error_px;
+    // null: equal, or with edges, which the reference's picture has not
+    row["psnr_db"] = std::isfinite(figures.errors.psnr_db) ? Json(figures.errors.psnr_db) : Json();
+    return row;
+}
+
+Json view_json(const TrimView& view)
+{
+    const Camera& camera = view.camera;
+    Json object;
+    object["view"] = view.name;
+    object["camera"] = {{"eye", camera.eye}, {"target", camera.target}, {"up", camera.up}, {"fov", camera.fov_deg}};
+    object["settings"] = Json::array();
+    for (const TrimFigures& figures : view.figures)
+        object["settings"].push_back(figures_json(figures));
+    return object;
+}
+
+void print_view(const std::string& pack, const TrimView& view)
+{
+    const Camera& c = view.camera;
+    fmt::print("{}, {}: --eye {},{},{} --target {},{},{} --up {},{},{}\n", printable(pack), view.name, c.eye[0],
+               c.eye[1], c.eye[2], c.target[0], c.target[1], c.target[2], c.up[0], c.up[1], c.up[2]);
+    fmt::print("{:<30}{:>12}{:>10}{:>8}{:>10}{:>9}{:>12}{:>12}{:>10}\n", "trims", "bytes", "frame ms", "x kd",
+               "ns/query", "PSNR dB", "wrong/M rays", "wrong/M qu.", "border px");
+    for (const TrimFigures& f : view.figures) {
+        std::string name = trim_name(f.setting.mode);
+        if (f.setting.edges)
+            name += " with edges";
+        if (f.setting.has_textures())
+            name += fmt::format(" {} {} {:g} %", source_name(f.setting.textures.source),
+                                layout_name(f.setting.textures.layout), 100 * f.setting.memory);
+        fmt::print("{:<30}{:>12}{:>10.2f}{:>8.3f}{:>10.3f}{:>9}{:>12.2f}{:>12.2f}{:>10.3f}\n", name, f.bytes,
+                   f.frame_ms, f.speed_to_kd, f.ns_per_query,
+                   f.setting.edges ? "" : fmt::format("{:.2f}", f.errors.psnr_db),
+                   per_million(f.errors.wrong_rays, f.errors.rays), per_million(f.wrong_queries, f.queries),
+                   f.errors.largest_border_error_px);
+    }
+    fmt::print("\n");
+}
+
+/// What is being done, on a terminal only.
+void show_progress(const std::string& pack, const std::string& text)
+{
+    if (isatty(STDERR_FILENO) != 0)
+        fmt::print(stderr, "\r\033[K{}: {}", printable(pack), text);
+}
+
+void end_progress()
+{
+    if (isatty(STDERR_FILENO) != 0)
+        fmt::print(stderr, "\r\033[K");
+}
+
+int run_bench_trims(BenchArguments arguments)
+{
+    const Result<PictureSize> size = parse_size(arguments.size, 1);
+    if (!size.ok())
+        return report_error(size.error());
+    TrimBenchOptions& options = arguments.options;
+    options.width = size->width;
+    options.height = size->height;
+    options.memories.clear();
+    for (const double percent : arguments.memory_percent)
+        options.memories.push_back(percent / 100);
+
+    Json packs = Json::array();
+    std::string device;
+    for (const std::string& pack : arguments.packs) {
+        const Result<std::shared_ptr<const Scene>> scene = load_scene(pack);
+        if (!scene.ok())
+            return report_error(scene.error());
+        const Result<TrimReport> report =
+            bench_trims(*scene, options, [&](const std::string& text) { show_progress(pack, text); });
+        end_progress();
+        if (!report.ok())
+            return report_error(report.error());
+        device = report->device;
+        Json object;
+        object["pack"] = pack;
+        object["views"] = Json::array();
+        for (const TrimView& view : report->views) {
+            object["views"].push_back(view_json(view));
+            if (!arguments.json)
+                print_view(pack, view);
+        }
+        packs.push_back(std::move(object));
+    }
+    if (arguments.json)
+        print_json({{"device", device},
+                    {"width", size->width},
+                    {"height", size->height},
+                    {"threads", options.threads},
+                    {"rounds", options.rounds},
+                    {"packs", packs}});
+    return kExitOk;
+}
+
+} // namespace
+
+void register_bench(CLI::App& app, int& exit_code)
+{
+    CLI::App* bench = app.add_subcommand("bench", "Measure a part of the tracer on packs");
+    bench->require_subcommand(1);
+    bench->footer("Examples:\n  trimray bench trims model.tray\n\n'trimray bench trims --help' describes it.");
+    CLI::App* trims = bench->add_subcommand("trims", "Time and errors of every trim mode, source, layout and memory");
+    const auto a = std::make_shared<BenchArguments>();
+    trims->add_option("PACK", a->packs, "Scene packs (.tray)")->required();
+    trims->add_option("--size", a->size, "WIDTHxHEIGHT in pixels")->capture_default_str();
+    trims
+        ->add_option("--views", a->options.views,
+                     "iso, front, back, left, right, top, bottom and close-up, with commas")
+        ->delimiter(',')
+        ->capture_default_str();
+    trims->add_option("--zoom", a->options.magnification, "How many times nearer close-up is than iso")
+        ->capture_default_str()
+        ->check(CLI::Range(1.5, 1000.0));
+    trims->add_option("--memory", a->memory_percent, "Textures in percent of the kd-trees' bytes, with commas")
+        ->delimiter(',')
+        ->capture_default_str()
+        ->check(CLI::Range(1.0, 10000.0));
+    trims->add_option("--rounds", a->options.rounds, "How often each setting is timed; medians are reported")
+        ->capture_default_str()
+        ->check(CLI::Range(1u, 10000u));
+    trims->add_option("--threads", a->options.threads, "CPU threads; 0: all cores")
+        ->capture_default_str()
+        ->check(CLI::Range(0u, 1024u));
+    trims->add_option("--instruction-set", a->options.instruction_set, "avx512, avx2 or sse4; default: the best");
+    trims->add_flag("--json", a->json, "Print one JSON object: all figures by pack and view");
+    trims->footer(
+        "Frames of all settings are timed in turns. 'x kd' is the median over the rounds of kd's time over the "
+        "setting's;\n"
+        "PSNR (sRGB over white), wrong rays and the largest distance between a wrong ray and its border are counted\n"
+        "against a picture whose trims are decided in double over all pieces; 'ns/query' is the mode alone, over the\n"
+        "queries that this picture asks. close-up goes from iso to where most trim borders are, by a fixed rule.\n\n"
+        "Examples:\n"
+        "  trimray bench trims model.tray\n"
+        "  trimray bench trims part.tray board.tray --size 1920x1080 --rounds 9 --json\n"
+        "  trimray bench trims model.tray --views close-up --zoom 30 --memory 100");
+    trims->callback([a, &exit_code] { exit_code = run_bench_trims(*a); });
+}
+
+} // namespace trimray

@@ -1,0 +1,227 @@
+#!/usr/bin/env python3
+"""Measures the trim modes on many models, and prints tables in Markdown.
+
+    tests/trims_table.py MODEL|PACK|FOLDER... [-o trims.jsonl] [--build DIR] [--size 1920x1080] [--rounds 5]
+
+Each model (`.zst` ones are decompressed first) is packed and goes through `trimray bench trims`: every mode, distance
+source, layout and memory from three views, one of them a close-up. The report is appended to the output as one line a
+model, and models that have a line are skipped, so an interrupted run goes on where it stopped; the tables are of all
+that the command line names. Run it on a machine that does nothing else: times are compared in turns, but not freed from
+each other's noise.
+
+Means over models and views: geometric for speeds, times and bytes, arithmetic for wrong rays and decibels, where a picture
+that equals the reference's counts as 100 dB.
+"""
+
+import argparse
+import json
+import math
+import pathlib
+import subprocess
+import sys
+import tempfile
+
+MODEL_ENDINGS = {".step", ".stp", ".igs", ".iges", ".brep"}
+EQUAL_DB = 100.0  # more than any picture that differs in one pixel by one level: 8 million pixels would reach 117
+PAPER, OURS = ("mask", "square"), ("curve", "isotropic")
+GOALS = {"speed": 1.6, "to_sdf": 0.97, "wrong": 1.0, "decibels": 6.0, "edges": 5.0}
+
+
+def plain_name(path):
+    return path.name[:-4] if path.suffix == ".zst" else path.name
+
+
+def is_input(path):
+    return path.is_file() and pathlib.Path(plain_name(path)).suffix.lower() in MODEL_ENDINGS | {".tray"}
+
+
+def inputs(arguments):
+    found = []
+    for path in arguments:
+        found += sorted(p for p in path.rglob("*") if is_input(p)) if path.is_dir() else [path]
+    return found
+
+
+def run_json(command):
+    done = subprocess.run([str(c) for c in command], capture_output=True, text=True, check=False)
+    if done.returncode not in (0, 6):
+        raise RuntimeError((done.stderr.strip().splitlines() or ["no message"])[-1])
+    return json.loads(done.stdout)
+
+
+def measure(path, options):
+    """The report of one model: that of `bench trims` for its pack, with the model's name and face counts."""
+    tools = options.build / "bin"
+    with tempfile.TemporaryDirectory() as folder:
+        model = path
+        if path.suffix == ".zst":
+            model = pathlib.Path(folder) / plain_name(path)
+            subprocess.run(["zstd", "-d", "-q", path, "-o", model], check=True)
+        pack = model
+        if model.suffix != ".tray":
+            pack = pathlib.Path(folder) / "model.tray"
+            run_json([tools / "trimray-pack", model, "-o", pack, "--no-previews", "--json"])
+        info = run_json([tools / "trimray", "info", pack, "--json"])
+        report = run_json([tools / "trimray", "bench", "trims", pack, "--json", "--size", options.size, "--rounds",
+                           options.rounds, "--threads", options.threads])
+    return {"model": path.name.removesuffix(".zst"), "faces": info["faces"],
+            "trimmed": next((int(e["why"].split()[0].replace(",", "")) for e in info["effects"]
+                             if e["name"].startswith("trim-")), 0),
+            "width": report["width"], "height": report["height"], "rounds": report["rounds"],
+            "threads": report["threads"], "device": report["device"], "views": report["packs"][0]["views"]}
+
+
+def geometric(values):
+    values = list(values)
+    return math.exp(sum(math.log(v) for v in values) / len(values)) if values else math.nan
+
+
+def mean(values):
+    values = list(values)
+    return sum(values) / len(values) if values else math.nan
+
+
+def decibels(row):
+    return EQUAL_DB if row["psnr_db"] is None else min(row["psnr_db"], EQUAL_DB)
+
+
+def shown(db):
+    return "equal" if db >= EQUAL_DB else f"{db:.1f}"
+
+
+class Reports:
+    """All rows of all models and views, by setting."""
+
+    def __init__(self, reports):
+        self.reports = reports
+
+    def rows(self, mode, textures=(None, None), percent=None, reports=None, edges=False):
+        return [row for report in reports or self.reports for view in report["views"] for row in view["settings"]
+                if (row["mode"], (row["source"], row["layout"]), row["memory_percent"], row["edges"])
+                == (mode, textures, percent, edges)]
+
+    def settings(self):
+        """Arguments for rows(), those with edges left out."""
+        view = self.reports[0]["views"][0]
+        return [(r["mode"], (r["source"], r["layout"]), r["memory_percent"]) for r in view["settings"] if not r["edges"]]
+
+
+def setting_name(mode, textures, percent):
+    return mode if percent is None else f"{mode} {textures[0]}/{textures[1]} {percent:g} %"
+
+
+def table(header, rows):
+    print("| " + " | ".join(header) + " |\n|" + "---|" * len(header))
+    for row in rows:
+        print("| " + " | ".join(row) + " |")
+    print()
+
+
+def print_settings(all_of):
+    rows = []
+    for setting in all_of.settings():
+        found = all_of.rows(*setting)
+        kd = all_of.rows("kd")
+        rows.append([setting_name(*setting), f"{geometric(r['speed_to_kd'] for r in found):.2f}",
+                     f"{geometric(r['ns_per_query'] for r in found):.2f}",
+                     f"{100 * geometric(r['bytes'] / k['bytes'] for r, k in zip(found, kd)):.0f}",
+                     shown(mean(decibels(r) for r in found)), shown(min(decibels(r) for r in found)),
+                     f"{mean(r['wrong_rays_per_million'] for r in found):.2f}",
+                     f"{max(r['border_error_px'] for r in found):.2f}"])
+    table(["trims", "frame, × kd", "ns a query", "bytes, % of kd", "PSNR mean, dB", "worst", "wrong rays a million",
+           "border error, px"], rows)
+
+
+def print_models(all_of):
+    rows = []
+    for report in all_of.reports:
+        of = [report]
+        kd, exact = all_of.rows("kd", reports=of), all_of.rows("exact", reports=of)
+        hybrid, sdf = (all_of.rows(mode, OURS, 100, of) for mode in ("hybrid", "sdf"))
+        paper = all_of.rows("sdf", PAPER, 100, of)
+        speed = [f"{geometric(r['speed_to_kd'] for r in found):.2f}" for found in (exact, hybrid, sdf, paper)]
+        rows.append([report["model"], f"{report['trimmed']:,} of {report['faces']:,}",
+                     " ".join(f"{r['bytes'] / 1000:.0f}" for r in (kd[0], exact[0], sdf[0])),
+                     f"{geometric(r['frame_ms'] for r in kd):.1f}", *speed,
+                     " ".join(f"{geometric(r['ns_per_query'] for r in found):.1f}"
+                              for found in (kd, exact, hybrid, sdf)),
+                     " / ".join(shown(decibels(r)) for r in paper), " / ".join(shown(decibels(r)) for r in sdf),
+                     f"{mean(r['wrong_rays_per_million'] for r in exact):.2f}",
+                     f"{mean(r['wrong_rays_per_million'] for r in sdf):.0f}",
+                     f"{max(r['border_error_px'] for r in exact):.2f}", f"{max(r['border_error_px'] for r in sdf):.1f}"])
+    table(["model", "trimmed faces", "kB kd, exact, sdf", "kd ms", "exact × kd", "hybrid", "sdf", "sdf mask/square",
+           "ns a query kd, exact, hybrid, sdf", "dB mask/square " + " / ".join(v["view"] for v in
+                                                                            all_of.reports[0]["views"]),
+           "dB curve/isotropic", "wrong a million exact", "sdf", "border px exact", "sdf"], rows)
+
+
+def print_goals(all_of):
+    def verdict(name, value, goal, met, unit=""):
+        print(f"- {name}: {value}{unit}, goal {goal}{unit}: {'met' if met else 'MISSED'}")
+
+    speed = {setting_name(*s): geometric(r["speed_to_kd"] for r in all_of.rows(*s))
+             for s in all_of.settings() if s[0] in ("exact", "hybrid")}
+    best = max(speed, key=speed.get)
+    verdict(f"frames faster than kd ({best})", f"{speed[best]:.3f}", f">= {GOALS['speed']}", speed[best] >= GOALS["speed"], " ×")
+    sdf = geometric(r["speed_to_kd"] for r in all_of.rows("sdf", OURS, 100))
+    verdict(f"speed of sdf at 100 % ({best})", f"{speed[best] / sdf:.3f}", f">= {GOALS['to_sdf']}",
+            speed[best] / sdf >= GOALS["to_sdf"], " ×")
+    right = [r for s in all_of.settings() if s[0] in ("exact", "hybrid") for r in all_of.rows(*s)]
+    worst = max(r["wrong_rays_per_million"] for r in right)
+    verdict("wrong rays a million, exact and hybrid, worst view", f"{worst:.2f}", f"<= {GOALS['wrong']:g}", worst <= GOALS["wrong"])
+    edges = [100 * (with_edges["frame_ms"] / plain["frame_ms"] - 1)
+             for with_edges, plain in zip(all_of.rows("exact", edges=True), all_of.rows("exact"))]
+    cost = 100 * (geometric(1 + e / 100 for e in edges) - 1)
+    verdict("edges, part of the frame (exact, sharp edges)", f"{cost:.1f}", f"<= {GOALS['edges']:g}", cost <= GOALS["edges"], " %")
+    asked = sum(r["queries"] for r in all_of.rows("exact"))
+    wrong = sum(r["wrong_queries"] for r in all_of.rows("exact"))
+    print(f"- wrong answers of exact among all {asked:,} queries: {wrong}")
+    for percent in sorted({s[2] for s in all_of.settings() if s[2] is not None}):
+        pairs = list(zip(all_of.rows("sdf", OURS, percent), all_of.rows("sdf", PAPER, percent)))
+        gain = mean(decibels(a) - decibels(b) for a, b in pairs)
+        bytes_ratio = geometric(a["bytes"] / b["bytes"] for a, b in pairs)
+        verdict(f"sdf curve/isotropic over mask/square at {percent:g} % ({bytes_ratio:.3f} of its bytes)", f"{gain:.1f}",
+                f">= {GOALS['decibels']:g}", gain >= GOALS["decibels"], " dB")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("inputs", nargs="+", type=pathlib.Path)
+    parser.add_argument("-o", "--output", type=pathlib.Path, default=pathlib.Path("trims.jsonl"))
+    parser.add_argument("--build", type=pathlib.Path, default=pathlib.Path(__file__).resolve().parent.parent / "build")
+    parser.add_argument("--size", default="1920x1080")
+    parser.add_argument("--rounds", type=int, default=5)
+    parser.add_argument("--threads", type=int, default=1)
+    options = parser.parse_args()
+
+    done = {}
+    if options.output.exists():
+        done = {report["model"]: report for report in map(json.loads, options.output.read_text().splitlines())}
+    reports = []
+    with open(options.output, "a", encoding="utf-8") as output:
+        for path in inputs(options.inputs):
+            name = path.name.removesuffix(".zst")
+            if name not in done:
+                print(f"{name} ...", file=sys.stderr, flush=True)
+                try:
+                    done[name] = measure(path, options)
+                except (RuntimeError, OSError) as failure:
+                    print(f"{name}: {failure}", file=sys.stderr)
+                    continue
+                output.write(json.dumps(done[name]) + "\n")
+                output.flush()
+            reports.append(done[name])
+    if not reports:
+        return 1
+    first = reports[0]
+    print(f"{len(reports)} models, {sum(len(r['views']) for r in reports)} views at {first['width']}x{first['height']}, "
+          f"{first['threads']} thread(s), {first['device']}, medians of {first['rounds']} rounds\n")
+    all_of = Reports(reports)
+    print_models(all_of)
+    print_settings(all_of)
+    print_goals(all_of)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
