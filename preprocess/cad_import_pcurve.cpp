@@ -121,10 +121,8 @@ void gauge_use(const TopoDS_Edge& edge, const PcurveGauge& gauge, const PcurvePo
         gauge.projected(edge, pcurve, first, last, deviation.mm, 0.1 * std::max(tolerance_mm, resolution_mm));
     if (!projected)
         return;
-    const double projected_mm = gauge
-                                    .deviation(
-                                        edge, [&](double t) { return curve_point(*projected, t); }, first, last)
-                                    .mm;
+    const auto projected_point = [&](double t) { return curve_point(*projected, t); };
+    const double projected_mm = gauge.deviation(edge, projected_point, first, last).mm;
     if (!(projected_mm <= kMuchNearer * deviation.mm))
         return;
     use.pcurve = std::move(*projected);
@@ -161,7 +159,9 @@ Result<CadEdgeUse> edge_use(const TopoDS_Edge& edge, const TopoDS_Face& face, co
         const gp_Pnt2d p = curve->Value(t);
         return Vec2d{p.X(), p.Y()};
     };
-    gauge_use(edge, gauge, point, first, last, resolution_mm, use);
+    // a face is not lost because one of its pcurves cannot be measured
+    if (failure_of([&] { gauge_use(edge, gauge, point, first, last, resolution_mm, use); }))
+        use.state = PcurveState::NotMeasured;
     const int index = edges.FindIndex(edge);
     if (index == 0)
         return Error{ErrorCode::InvalidTrim, "edge", "it is not among its part's edges"};

@@ -39,6 +39,7 @@ enum class PcurveState : uint8_t {
     Small,       // kept: less than the pack resolves
     OffSurface,  // kept: it is the curve that lies off the surface
     NotBettered, // kept: no projection is much nearer
+    NotMeasured, // kept: the kernel gave up on it
 };
 
 /// One use of an edge in a loop of a face: the pcurve is followed from `first` to `last`, or backwards if `reversed`.

@@ -200,6 +200,8 @@ const char* state_text(PcurveState state)
         return "kept: the edge's curve lies off the surface";
     case PcurveState::NotBettered:
         return "kept: no projection is much nearer";
+    case PcurveState::NotMeasured:
+        return "kept: the kernel could not measure it";
     }
     return "within tolerance";
 }

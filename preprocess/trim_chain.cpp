@@ -302,7 +302,7 @@ std::vector<TrimChain> build_chains(const CadFace& face, double relative_toleran
 {
     std::vector<std::vector<Use>> loops;
     Rect2d rough = kEmptyRect;
-    int index = kNoUse;
+    int index = -1; // of the use at hand
     std::map<uint32_t, int> uses_of_edge;
     for (const CadLoop& loop : face.loops)
         for (const CadEdgeUse& edge : loop)

@@ -8,7 +8,7 @@
 
 namespace trimray {
 
-/// A pcurve that lies, or lay in the file, farther from its edge's curve than the edge's tolerance.
+/// A pcurve that lies, or lay in the file, farther from its edge's curve than the edge's tolerance, or may do so.
 struct PcurveDeviation {
     uint32_t part = 0, face_in_part = 0;
     uint32_t edge = 0; // index into CadPart::edges
