@@ -8,12 +8,14 @@
 namespace trimray {
 namespace {
 
+constexpr uint kTextureFlags = kFaceTexelCentres | kFaceTileShiftMask << kFaceTileShiftBit;
+
 struct TrimBytes {
     const float* points;
     const uint* pieces;
     size_t points_size, pieces_size; // in bytes
     struct {
-        uint point_count, piece_count, sdf_size;
+        uint point_count, piece_count, sdf_size, flags;
         float extent_mm[2];
     } facts;
 
@@ -21,8 +23,12 @@ struct TrimBytes {
         : points(image.trim_points.data() + 2 * static_cast<size_t>(face.first_point)),
           pieces(image.trim_pieces.data() + face.first_piece),
           points_size(2 * sizeof(float) * static_cast<size_t>(face.point_count)),
-          pieces_size(sizeof(uint) * static_cast<size_t>(face.piece_count)),
-          facts{face.point_count, face.piece_count, face.sdf_size, {face.extent_mm[0], face.extent_mm[1]}}
+          pieces_size(sizeof(uint) * static_cast<size_t>(face.piece_count)), facts{
+                                                                                 face.point_count,
+                                                                                 face.piece_count,
+                                                                                 face.sdf_size,
+                                                                                 face.flags & kTextureFlags,
+                                                                                 {face.extent_mm[0], face.extent_mm[1]}}
     {
     }
     uint64_t hash() const

@@ -8,8 +8,8 @@
 
 namespace trimray {
 
-/// For each face, the first face with the same points, pieces, extent and texture size, bit for bit; itself if it is
-/// the first or has no trims.
+/// For each face, the first face with the same points, pieces, flags, extent and texture size, bit for bit; itself if
+/// it is the first or has no trims.
 std::vector<uint> first_alike(const PackImage& image);
 
 } // namespace trimray

@@ -52,6 +52,10 @@ TRIMRAY_CONST uint kFaceNaturalBorder = 2u; // the domain rectangle is the trim:
 TRIMRAY_CONST uint kFaceHasColor = 4u;      // else the instance's colour
 TRIMRAY_CONST uint kFaceApproximated = 8u;  // surface converted with a deviation, see deviation_mm
 TRIMRAY_CONST uint kFaceOpenLoop = 16u;     // a loop did not close within tolerance and was closed by a segment
+TRIMRAY_CONST uint kFaceTexelCentres = 32u; // texels at (i + 0.5) / width, see kSdfInset
+// and where tiles of a distance texture are kept, the logarithm of a tile's side in steps between texels; 0: rows
+TRIMRAY_CONST uint kFaceTileShiftBit = 8u;
+TRIMRAY_CONST uint kFaceTileShiftMask = 7u;
 
 // A patch: one native surface, or one Bezier patch, of one face.
 struct PatchRecord {
@@ -143,10 +147,17 @@ TRIMRAY_CONST uint kCellIn = 1u;
 TRIMRAY_CONST uint kCellMixedCornerOut = 2u;
 TRIMRAY_CONST uint kCellMixedCornerIn = 3u;
 
-// Distance texel: 8 bits b, distance = (b - 128) / 32 texels, positive inside; 4 texels of a row in one word, rows
-// padded to whole words; texel centres at (i + 0.5) / width. One texel's length is the longer of the two on the surface
-// (square layout) or the same in u and v (isotropic layout).
-TRIMRAY_CONST float kSdfTexelQuantum = 1.0f / 32.0f;
+// Distance texel: one byte b, distance = (b - 128) / 64 texels, inside where it is 0 or more; bytes lie in words from
+// the low end. The outer texels lie kSdfInset steps inside the domain (half a step with kFaceTexelCentres): texel i at
+// u = (i + inset) / (width - 1 + 2 inset). The unit is the longer of the two steps between texels on the surface. A
+// texture is rows of texels, or an entry of 2 bytes for each tile, row after row, and then the tiles that are kept, row
+// by row: (side + 1)^2 texels, the last of which are the next tile's first. All texels of a tile that is not kept are
+// 0, or all are 255.
+TRIMRAY_CONST uint kTileOut = 0u;
+TRIMRAY_CONST uint kTileIn = 1u;
+TRIMRAY_CONST uint kFirstTile = 2u; // entry - kFirstTile: number of a tile that is kept
+TRIMRAY_CONST float kSdfTexelQuantum = 1.0f / 64.0f;
+TRIMRAY_CONST float kSdfInset = 0.125f;
 
 struct FaceRecord {
     uint part;

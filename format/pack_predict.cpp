@@ -1,11 +1,14 @@
 #include "format/pack_predict.h"
 
+#include "format/trim_texture.h"
+
 #include <algorithm>
 #include <bit>
 #include <cassert>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <optional>
 
 namespace trimray {
 namespace {
@@ -137,28 +140,112 @@ void code_pieces(const std::vector<FaceRecord>& faces, std::span<uint> words, Wa
 
 // ---- textures ------------------------------------------------------------------------------------------------------
 
-/// Bytes of each texture beside left + upper - upper left, cut to 0 ... 255. Padding is coded like texels.
+/// One texture's bytes, from texels to differences or back, in the order of the bytes. Texels are expected at
+/// left + upper - upper left, cut to 0 ... 255; those that a tile shares with the tile left of it or below at that
+/// tile's. Tiles that are kept are numbered in their order, so all their entries become kFirstTile.
+class TextureCoder {
+public:
+    /// `known`: the texture's bytes as they are (Predict), or `bytes` itself.
+    TextureCoder(const TextureShape& shape, std::span<const std::byte> known, std::span<std::byte> bytes, Way way)
+        : shape_(shape), known_(known), bytes_(bytes), way_(way), below_(shape.tiles_u)
+    {
+    }
+
+    /// Returns how many bytes the texture takes, or nothing if a tile leaves the array. Domain: the rest does not.
+    std::optional<size_t> code()
+    {
+        if (shape_.tile_shift == 0) {
+            code_texels(0, shape_.height, [](uint, uint) { return std::optional<int>(); });
+            return 4 * shape_.words(0);
+        }
+        for (uint ty = 0; ty < shape_.tiles_v; ++ty)
+            for (uint tx = 0; tx < shape_.tiles_u; ++tx)
+                if (!code_tile(tx, ty))
+                    return std::nullopt;
+        return 4 * shape_.words(kept_);
+    }
+
+private:
+    struct Tile {
+        int constant = 0;
+        std::optional<size_t> first; // byte of a tile that is kept
+    };
+
+    bool code_tile(uint tx, uint ty)
+    {
+        const size_t at = 2 * (static_cast<size_t>(ty) * shape_.tiles_u + tx);
+        const uint entry = static_cast<uint>(known_[at]) | static_cast<uint>(known_[at + 1]) << 8;
+        Tile tile{entry == kTileIn ? 255 : 0, std::nullopt};
+        if (entry >= kFirstTile) {
+            if (4 * shape_.words(kept_ + 1) > bytes_.size())
+                return false;
+            tile.first = shape_.directory_bytes() + static_cast<size_t>(kept_) * shape_.tile_bytes();
+            const uint coded = way_ == Way::Predict ? entry - kept_ : entry + kept_;
+            bytes_[at] = std::byte(coded & 0xffu);
+            bytes_[at + 1] = std::byte(coded >> 8 & 0xffu);
+            ++kept_;
+            const uint last = shape_.stride - 1;
+            code_texels(*tile.first, shape_.stride, [&](uint x, uint y) -> std::optional<int> {
+                if (x == 0 && tx > 0)
+                    return texel(left_, last, y);
+                if (y == 0 && ty > 0)
+                    return texel(below_[tx], x, last);
+                return std::nullopt;
+            });
+        }
+        left_ = below_[tx] = tile;
+        return true;
+    }
+
+    int texel(const Tile& tile, uint x, uint y) const
+    {
+        return tile.first ? int(known_[*tile.first + y * shape_.stride + x]) : tile.constant;
+    }
+
+    /// Rows of `stride` texels from byte `first` on; `shared` says what a texel must be, where that is known.
+    template <class Shared>
+    void code_texels(size_t first, uint rows, Shared&& shared)
+    {
+        const size_t width = shape_.stride;
+        for (size_t n = 0; n < width * rows; ++n) {
+            const size_t x = n % width, y = n / width;
+            const std::byte* const at = &known_[first + n];
+            const int left = x > 0 ? int(at[-1]) : 0, upper = y > 0 ? int(*(at - width)) : 0;
+            int guess = left + upper; // of one that exists
+            if (x > 0 && y > 0)
+                guess = std::clamp(guess - int(*(at - width - 1)), 0, 255);
+            guess = shared(static_cast<uint>(x), static_cast<uint>(y)).value_or(guess);
+            std::byte& coded = bytes_[first + n];
+            coded = std::byte(way_ == Way::Predict ? int(*at) - guess : int(coded) + guess);
+        }
+    }
+
+    const TextureShape& shape_;
+    const std::span<const std::byte> known_;
+    const std::span<std::byte> bytes_;
+    const Way way_;
+    uint kept_ = 0;
+    Tile left_;
+    std::vector<Tile> below_;
+};
+
+/// Textures in the order of their faces; one that begins before the end of another is skipped, and where one leaves the
+/// array the rest stays as it is.
 void code_textures(const std::vector<FaceRecord>& faces, std::span<std::byte> bytes, Way way)
 {
     size_t end = 0;
-    std::vector<std::byte> texels;
+    const std::vector<std::byte> copy(way == Way::Predict ? bytes.begin() : bytes.end(), bytes.end());
+    const std::span<const std::byte> known = way == Way::Predict ? std::span<const std::byte>(copy) : bytes;
     for (const FaceRecord& face : faces) {
-        const size_t width = ((face.sdf_size & 0xffffu) + 3) / 4 * 4, height = face.sdf_size >> 16;
-        const size_t first = size_t{4} * face.sdf_first_word, size = width * height;
-        if (size == 0 || first < end || first > bytes.size() || size > bytes.size() - first)
+        const TextureShape shape = texture_shape(face);
+        const size_t first = size_t{4} * face.sdf_first_word;
+        if (shape.width == 0 || shape.height == 0 || first < end || first > bytes.size() ||
+            4 * shape.words(0) > bytes.size() - first)
             continue;
-        std::byte* const coded = &bytes[first];
-        texels.assign(coded, coded + size);
-        const std::byte* const known = way == Way::Predict ? texels.data() : coded;
-        for (size_t n = 0; n < size; ++n) {
-            const bool has_left = n % width != 0, has_upper = n >= width;
-            const int left = has_left ? int(known[n - 1]) : 0, upper = has_upper ? int(known[n - width]) : 0;
-            int guess = left + upper; // of one that exists
-            if (has_left && has_upper)
-                guess = std::clamp(guess - int(known[n - width - 1]), 0, 255);
-            coded[n] = std::byte(way == Way::Predict ? int(texels[n]) - guess : int(coded[n]) + guess);
-        }
-        end = first + size;
+        const std::optional<size_t> size = TextureCoder(shape, known.subspan(first), bytes.subspan(first), way).code();
+        if (!size)
+            return;
+        end = first + *size;
     }
 }
 

@@ -4,6 +4,7 @@
 #include "format/pack_file.h"
 #include "format/pack_filter.h"
 #include "format/pack_predict.h"
+#include "format/trim_texture.h"
 
 #include <algorithm>
 #include <atomic>
@@ -481,7 +482,7 @@ private:
             return;
         uint64_t texture_bytes = 0;
         for (const FaceRecord& f : image.faces)
-            texture_bytes += 4ull * (((f.sdf_size & 0xffff) + 3) / 4) * (f.sdf_size >> 16);
+            texture_bytes += 4 * texture_shape(f).words_at_most();
         if (texture_bytes > options_.max_decoded_bytes) {
             fault(3123, "FACE",
                   fmt::format("{} bytes of textures, the budget is {}", texture_bytes, options_.max_decoded_bytes));

@@ -2,6 +2,7 @@
 // infinite. SPEC.md, "What a reader checks", says the same in words; findings 32xx are these.
 #include "format/pack_file.h"
 #include "format/pack_reader.h"
+#include "format/trim_texture.h"
 
 #include <algorithm>
 #include <cmath>
@@ -272,8 +273,8 @@ private:
 
     void check_face_numbers(const FaceRecord& f, size_t i)
     {
-        constexpr uint kKnownFlags =
-            kFaceReversed | kFaceNaturalBorder | kFaceHasColor | kFaceApproximated | kFaceOpenLoop;
+        constexpr uint kKnownFlags = kFaceReversed | kFaceNaturalBorder | kFaceHasColor | kFaceApproximated |
+                                     kFaceOpenLoop | kFaceTexelCentres | kFaceTileShiftMask << kFaceTileShiftBit;
         if (f.surface_kind >= kSurfaceKindCount || (f.flags & ~kKnownFlags) != 0 ||
             f.border_classes > ((f.flags & kFaceNaturalBorder) != 0 ? 0xffu : 0u))
             report_.add(3211, "FACE", fmt::format("face {}: kind {}, flags {:#x}", i, f.surface_kind, f.flags));
@@ -365,9 +366,9 @@ private:
             }
             for (uint k = 0; k < f.piece_count; ++k)
                 check_piece(f, image_.trim_pieces[f.first_piece + k], 0, "TPCE", i);
+            check_texture(f, i);
             if (has_derived_) {
                 check_cells(f, i);
-                check_texture(f, i);
             } else if ((f.grid | f.first_cell | f.first_entry | f.entry_count | f.sdf_first_word) != 0) {
                 report_.add(3222, "FACE", fmt::format("face {}: cells in a compact pack", i));
             }
@@ -421,11 +422,29 @@ private:
     {
         if (f.sdf_size == 0)
             return;
-        const uint64_t width = f.sdf_size & 0xffff, height = f.sdf_size >> 16;
-        if (width == 0 || height == 0 ||
-            !is_range_inside(f.sdf_first_word, (width + 3) / 4 * height, image_.sdf_words.size()))
-            report_.add(3225, "FACE",
-                        fmt::format("face {}: {} x {} texels from word {}", i, width, height, f.sdf_first_word));
+        const TextureShape shape = texture_shape(f);
+        const uint64_t tiles = static_cast<uint64_t>(shape.tiles_u) * shape.tiles_v;
+        const std::string what = fmt::format("face {}: {} x {} texels, tile shift {}, from word {}", i, shape.width,
+                                             shape.height, shape.tile_shift, f.sdf_first_word);
+        if (shape.width == 0 || shape.height == 0 || std::max(shape.width, shape.height) > kMaxTextureSide ||
+            shape.tile_shift > kMaxTileShift || tiles > kMaxTiles)
+            report_.add(3238, "FACE", what);
+        else if (has_derived_ && !is_range_inside(f.sdf_first_word, shape.words(0), image_.sdf_words.size()))
+            report_.add(3225, "FACE", what);
+        else if (has_derived_ && shape.tile_shift > 0)
+            check_tiles(f, shape, i);
+    }
+
+    void check_tiles(const FaceRecord& f, const TextureShape& shape, size_t i)
+    {
+        const std::span<const uint> words = std::span(image_.sdf_words).subspan(f.sdf_first_word);
+        for (uint tile = 0; tile < shape.tiles_u * shape.tiles_v; ++tile) {
+            const uint entry = words[tile / 2] >> 16 * (tile % 2) & 0xffffu;
+            if (entry >= kFirstTile && shape.words(entry - kFirstTile + 1) > words.size()) {
+                report_.add(3225, "SDFW", fmt::format("face {}, tile {}: entry {}", i, tile, entry));
+                return;
+            }
+        }
     }
 
     void check_leaves()

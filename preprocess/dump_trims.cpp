@@ -1,6 +1,7 @@
 #include "preprocess/dump_trims.h"
 
 #include "format/distance_field.h"
+#include "format/trim_texture.h"
 
 #include <fmt/format.h>
 
@@ -112,22 +113,11 @@ Rgb cell_color(const PackImage& image, const FaceRecord& face, double u, double 
 
 Rgb distance_color(const PackImage& image, const FaceRecord& face, double u, double v)
 {
-    const int width = static_cast<int>(face.sdf_size & 0xffffu), height = static_cast<int>(face.sdf_size >> 16);
-    const auto texel = [&](int x, int y) {
-        x = std::clamp(x, 0, width - 1);
-        y = std::clamp(y, 0, height - 1);
-        const uint word = image.sdf_words[face.sdf_first_word + static_cast<uint>(y * ((width + 3) / 4) + x / 4)];
-        return (static_cast<double>(word >> (8 * (x % 4)) & 0xffu) - 128) * kSdfTexelQuantum;
-    };
-    const double x = u * width - 0.5, y = v * height - 0.5;
-    const int i = static_cast<int>(std::floor(x)), j = static_cast<int>(std::floor(y));
-    const double s = x - i, t = y - j;
-    const double d = (1 - t) * ((1 - s) * texel(i, j) + s * texel(i + 1, j)) +
-                     t * ((1 - s) * texel(i, j + 1) + s * texel(i + 1, j + 1));
+    const double d = texture_distance(image, face, u, v);
     const double dim = std::abs(d) <= face.sdf_band_texels ? 0.75 : 1.0;
-    const double level = dim * (255 - 40 * std::min(std::abs(d), 4.0)), base = dim * 255;
+    const double level = dim * (255 - 80 * std::min(std::abs(d), 2.0)), base = dim * 255;
     const auto byte = [](double value) { return static_cast<uint8_t>(std::clamp(value, 0.0, 255.0)); };
-    return d > 0 ? Rgb{byte(base), byte(level), byte(0.5 * level)} : Rgb{byte(0.5 * level), byte(level), byte(base)};
+    return d >= 0 ? Rgb{byte(base), byte(level), byte(0.5 * level)} : Rgb{byte(0.5 * level), byte(level), byte(base)};
 }
 
 bool dump_face(const PackImage& image, const FaceRecord& face, const std::filesystem::path& path)

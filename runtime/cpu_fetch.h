@@ -48,9 +48,17 @@ FN scalar2 fetch_trim_point(FETCH_PARAM uint index)
     const float* p = source.trim_points + 2 * std::size_t(index);
     return scalar2(p[0], p[1]);
 }
-FN integer fetch_sdf_word(FETCH_PARAM integer index)
+/// Word `index` of the texture that begins at first_word
+FN integer fetch_sdf_word(FETCH_PARAM uint first_word, integer index)
 {
-    return gather(source.sdf_words, index);
+    return gather(source.sdf_words + first_word, index);
+}
+/// Byte `at` of the texture that begins at first_word, and in the next 8 bits the byte after it. Both must be the
+/// texture's. The four bytes that are read end with them, or are the texture's first: none lies behind the array.
+FN integer fetch_sdf_pair(FETCH_PARAM uint first_word, integer at)
+{
+    const integer from = max(at, integer(2u)) - integer(2u);
+    return gather_bytes(source.sdf_words + first_word, from) >> ((at - from) << integer(3u));
 }
 FN scalar2 fetch_kd_point(FETCH_PARAM uint index)
 {

@@ -59,7 +59,7 @@ FN mask inside_exact(const FetchSource& source, const FaceRecord& face, real2 uv
     });
 }
 
-/// The texture is asked for mixed cells only, and then once for all lanes: four gathers cost more than a cell's class.
+/// The texture is asked for mixed cells only, and then once for all lanes: its gathers cost more than a cell's class.
 FN mask inside_hybrid(const FetchSource& source, const FaceRecord& face, real2 uv, mask asked, uint64_t& curve_tests)
 {
     const TrimFace trim = trim_face(face);
@@ -67,9 +67,9 @@ FN mask inside_hybrid(const FetchSource& source, const FaceRecord& face, real2 u
     bool looked_up = false;
     return inside_by_cells(source, trim, uv, asked, [&](uint cell, mask here) HWY_ATTR {
         if (!looked_up) {
-            const real distance_texels = sdf_distance(FETCH_PASS trim, uv);
+            const real distance_texels = sdf_distance(FETCH_PASS sdf_face(face), uv);
             sure = abs(distance_texels) > face.sdf_band_texels;
-            positive = distance_texels > 0.0f;
+            positive = sdf_inside(distance_texels);
             looked_up = true;
         }
         const mask inside = here && sure && positive, open = here && !sure;
@@ -93,7 +93,7 @@ FN_LARGE mask inside_trims(const FetchSource& source, TrimMode mode, uint face_i
         return inside_exact(source, face, q, asked, curve_tests);
     if (mode == TrimMode::Hybrid)
         return inside_hybrid(source, face, q, asked, curve_tests);
-    return sdf_distance(FETCH_PASS trim_face(face), q) > 0.0f;
+    return sdf_inside(sdf_distance(FETCH_PASS sdf_face(face), q));
 }
 
 SHARED_CLOSE

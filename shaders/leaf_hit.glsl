@@ -107,16 +107,16 @@ bool inside_trims(uint face_id, FaceRecord face, vec2 uv)
         return false;
     TrimFace trim = trim_face(face);
     if (trim_mode == kTrimByTexture)
-        return sdf_distance(trim, uv) > 0.0f;
+        return sdf_inside(sdf_distance(sdf_face(face), uv));
     // the cell's class takes one fetch and decides most; the texture's four come before the pieces
     uint word = fetch_cell(cell_index(trim, uv));
     bool inside = cell_says_inside(word);
     if (!cell_is_mixed(word))
         return inside;
     if (trim_mode == kTrimByBoth) {
-        float distance_texels = sdf_distance(trim, uv);
+        float distance_texels = sdf_distance(sdf_face(face), uv);
         if (abs(distance_texels) > face.sdf_band_texels)
-            return distance_texels > 0.0f;
+            return sdf_inside(distance_texels);
     }
     uint at = cell_first_entry(trim, word);
     for (;;) {

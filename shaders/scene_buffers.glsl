@@ -44,8 +44,16 @@ uint fetch_cell(uint at) { return cells[at]; }
 uint fetch_entry_word(uint at) { return cell_entries[at].word; }
 float fetch_entry_eta(uint at) { return cell_entries[at].eta; }
 vec2 fetch_trim_point(uint at) { return trim_points[at]; }
-uint fetch_sdf_word(uint at) { return sdf_words[at]; }
 vec2 fetch_kd_point(uint at) { return kd_points[at]; }
+// Word `index` of the texture that begins at first_word
+uint fetch_sdf_word(uint first_word, uint index) { return sdf_words[first_word + index]; }
+// Byte `at` of the texture that begins at first_word, and in the next 8 bits the byte after it
+uint fetch_sdf_pair(uint first_word, uint at)
+{
+    uint next = at + 1u;
+    uint low = sdf_words[first_word + (at >> 2)] >> ((at & 3u) << 3) & 0xffu;
+    return low | (sdf_words[first_word + (next >> 2)] >> ((next & 3u) << 3) & 0xffu) << 8;
+}
 
 vec3 vector(float v[3]) { return vec3(v[0], v[1], v[2]); }
 bool has_kind(uint kind) { return (kinds & (1u << kind)) != 0u; }

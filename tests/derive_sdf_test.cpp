@@ -1,6 +1,7 @@
 // Distance textures: mask, transform and bytes against the slow, obvious forms; the band's bound; memory to the byte.
 #include "format/derive.h"
 #include "format/distance_field.h"
+#include "format/trim_texture.h"
 #include "tests/trim_shapes.h"
 
 #include <gtest/gtest.h>
@@ -22,25 +23,6 @@ std::vector<std::vector<Loop>> shapes_for_masks()
         {polygon({{0, 0}, {1, 1}, {1, 0}, {0, 1}})},
         {polygon({{0.25f, 0.25f}, {0.75f, 0.25f}, {0.75f, 0.75f}, {0.25f, 0.75f}}), polygon(kSquare)},
     };
-}
-
-double texel(const PackImage& image, const FaceRecord& face, int x, int y)
-{
-    const int width = static_cast<int>(face.sdf_size & 0xffffu), height = static_cast<int>(face.sdf_size >> 16);
-    x = std::clamp(x, 0, width - 1);
-    y = std::clamp(y, 0, height - 1);
-    const uint word = image.sdf_words[face.sdf_first_word + static_cast<uint>(y * ((width + 3) / 4) + x / 4)];
-    return (static_cast<double>(word >> (8 * (x % 4)) & 0xffu) - 128) * kSdfTexelQuantum;
-}
-
-/// Bilinear look-up, in texels.
-double look_up(const PackImage& image, const FaceRecord& face, double u, double v)
-{
-    const double x = u * (face.sdf_size & 0xffffu) - 0.5, y = v * (face.sdf_size >> 16) - 0.5;
-    const int i = static_cast<int>(std::floor(x)), j = static_cast<int>(std::floor(y));
-    const double s = x - i, t = y - j;
-    return (1 - t) * ((1 - s) * texel(image, face, i, j) + s * texel(image, face, i + 1, j)) +
-           t * ((1 - s) * texel(image, face, i, j + 1) + s * texel(image, face, i + 1, j + 1));
 }
 
 TEST(derive_sdf, masks_equal_an_exact_crossing_count)
@@ -109,10 +91,10 @@ void expect_band(const PackImage& image, uint f, double extent_u, double extent_
     std::uniform_real_distribution<double> uniform(0, 1);
     for (int i = 0; i < 4000; ++i) {
         const double u = uniform(rng), v = uniform(rng);
-        const double b = look_up(image, face, u, v);
+        const double b = texture_distance(image, face, u, v);
         const bool inside = exact_inside(pieces, u, v);
         if (std::abs(b) > face.sdf_band_texels) {
-            ASSERT_EQ(b > 0, inside) << "face " << f << " at " << u << ", " << v << ": " << b;
+            ASSERT_EQ(b >= 0, inside) << "face " << f << " at " << u << ", " << v << ": " << b;
         }
         const double d = exact_distance(pieces, u, v, extent_u, extent_v) / face.sdf_texel_mm * (inside ? 1 : -1);
         if (std::abs(d) < 2.5) { // samples around are not clamped
@@ -183,7 +165,7 @@ TEST(derive_sdf, square_layout_follows_equations_4_and_5_to_the_byte)
     size_t words = 0;
     for (const FaceRecord& face : image.faces) {
         EXPECT_TRUE(face.sdf_size == 0 || face.sdf_first_word == words);
-        words += ((face.sdf_size & 0xffffu) + 3) / 4 * (face.sdf_size >> 16); // rows padded to whole words
+        words += texture_shape(face).words(0); // the last is padded
     }
     EXPECT_EQ(image.sdf_words.size(), words);
 }
@@ -194,26 +176,55 @@ TEST(derive_sdf, isotropic_layout_keeps_to_the_total_and_spares_small_faces)
     const float extents[5][2] = {{100, 100}, {1, 1}, {300, 2}, {0.1f, 0.1f}, {50, 20}};
     for (const auto& e : extents)
         add_face(image, {circle(0.5, 0.5, 0.5, 0.5)}, e[0], e[1]);
-    for (const double total : {500.0, 5000.0, 100000.0}) {
-        allocate_trim_memory(image, total, {});
-        double texels = 0;
-        for (const FaceRecord& face : image.faces) {
-            const uint width = face.sdf_size & 0xffffu, height = face.sdf_size >> 16;
-            texels += width * height;
-            EXPECT_GE(width * height, std::min(64.0, 0.1 * total) * 0.7);
-            const double ratio = (face.extent_mm[0] / width) / (face.extent_mm[1] / height);
-            if (width >= 8 && height >= 8) {
-                EXPECT_NEAR(ratio, 1, 0.15);
+    double area = 0;
+    for (const FaceRecord& face : image.faces)
+        area += face.area_mm2;
+    for (const TrimSource source : {TrimSource::Curve, TrimSource::Mask})
+        for (const double total : {500.0, 5000.0, 100000.0}) {
+            allocate_trim_memory(image, total, {source, TrimLayout::Isotropic});
+            derive_sdf(image);
+            EXPECT_LE(4.0 * static_cast<double>(image.sdf_words.size()), total);
+            EXPECT_GE(4.0 * static_cast<double>(image.sdf_words.size()), 0.8 * total);
+            const double floor_bytes = std::min(64.0, 0.1 * total);
+            for (uint f = 0; f < 5; ++f) {
+                const FaceRecord& face = image.faces[f];
+                const size_t end = f + 1 < 5 ? image.faces[f + 1].sdf_first_word : image.sdf_words.size();
+                const double bytes = 4.0 * static_cast<double>(end - face.sdf_first_word);
+                // M_i = ceil(M_total A_i / sum A), after what each face gets
+                EXPECT_LE(bytes, std::ceil(floor_bytes + (total - 5 * floor_bytes) * face.area_mm2 / area));
+                EXPECT_GE(bytes, 0.7 * floor_bytes);
+                const uint width = face.sdf_size & 0xffffu, height = face.sdf_size >> 16;
+                if (width >= 8 && height >= 8) {
+                    EXPECT_NEAR((face.extent_mm[0] / width) / (face.extent_mm[1] / height), 1, 0.15);
+                }
             }
         }
-        EXPECT_LE(texels, total);
-        EXPECT_GE(texels, 0.8 * total);
-    }
     allocate_trim_memory(image, 0, {});
     derive_sdf(image);
     EXPECT_TRUE(image.sdf_words.empty());
     for (const FaceRecord& face : image.faces)
         EXPECT_EQ(face.sdf_size, 0u);
+}
+
+TEST(derive_sdf, tiles_give_every_texel_back_and_keep_those_near_a_border_only)
+{
+    for (const uint tile_shift : {0u, 1u, 2u, 3u, 4u})
+        for (const auto& [width, height] : {std::pair{1u, 1u}, {2u, 2u}, {3u, 17u}, {90u, 70u}, {65u, 64u}}) {
+            std::vector<uint8_t> levels;
+            for (uint y = 0; y < height; ++y)
+                for (uint x = 0; x < width; ++x)
+                    levels.push_back(
+                        static_cast<uint8_t>(std::clamp(128 + 64 * (20 - std::hypot(x - 30.0, y - 30.0)), 0.0, 255.0)));
+            const TextureShape shape = texture_shape(width, height, tile_shift);
+            const std::vector<uint> words = pack_texels(shape, levels);
+            for (uint y = 0; y < height; ++y)
+                for (uint x = 0; x < width; ++x)
+                    ASSERT_EQ(texel_level(shape, words.data(), x, y), levels[y * width + x])
+                        << width << " x " << height << ", tile shift " << tile_shift << ": " << x << ", " << y;
+            if (tile_shift > 0 && width == 90) {
+                EXPECT_LT(words.size(), 0.6 * static_cast<double>(shape.words_at_most()));
+            }
+        }
 }
 
 TEST(derive_sdf, bytes_do_not_depend_on_the_number_of_threads)

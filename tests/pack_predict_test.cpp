@@ -1,6 +1,7 @@
 // Filter 2: sections as differences from their prediction.
 #include "format/derive.h"
 #include "format/pack_predict.h"
+#include "format/trim_texture.h"
 #include "tests/random_pack.h"
 
 #include <gtest/gtest.h>
@@ -12,7 +13,7 @@
 namespace trimray::test {
 namespace {
 
-/// A pack with nets, trees, trim points on their grid, and two textures of smooth texels.
+/// A pack with nets, trees, trim points on their grid, and three textures of smooth texels.
 PackImage predictable_pack()
 {
     PackImage image = random_pack(5, 3, 12);
@@ -32,15 +33,18 @@ PackImage predictable_pack()
             point += cubic != 0 ? 3 : 1;
         }
     }
-    uint first_word = 0;
-    for (uint f = 0; f < 2; ++f) {
-        const uint width = 6 + f, height = 5;
-        image.faces[f].sdf_size = width | height << 16;
-        image.faces[f].sdf_first_word = first_word;
-        for (uint y = 0; y < height; ++y)
-            for (uint word = 0; word < 2; ++word)
-                image.sdf_words.push_back((100 + 9 * y + 40 * word) * 0x01010101u + 0x030200u);
-        first_word = uint(image.sdf_words.size());
+    for (uint f = 0; f < 3; ++f) { // rows, and tiles of two sizes; some are constant
+        const TextureShape shape = texture_shape(21 + f, 16, f == 0 ? 0 : f + 1);
+        std::vector<uint8_t> levels;
+        for (uint y = 0; y < shape.height; ++y)
+            for (uint x = 0; x < shape.width; ++x)
+                levels.push_back(static_cast<uint8_t>(std::clamp(300.0 - 30 * std::hypot(x + 0.5, y), 0.0, 255.0)));
+        image.faces[f].sdf_size = shape.width | shape.height << 16;
+        image.faces[f].flags |= shape.tile_shift << kFaceTileShiftBit;
+        image.faces[f].sdf_first_word = uint(image.sdf_words.size());
+        const std::vector<uint> words = pack_texels(shape, levels);
+        EXPECT_LT(words.size(), shape.words_at_most() + (f == 0)) << "no tile is constant";
+        image.sdf_words.insert(image.sdf_words.end(), words.begin(), words.end());
     }
     return image;
 }
@@ -108,6 +112,7 @@ TEST(pack_predict, any_bytes_restore_to_the_same_records_every_time)
         face.sdf_size = repeat % 2 == 0 ? random() : random() & 0x00070007u;
         face.sdf_first_word = random() % 30;
         face.first_piece = repeat % 2 == 0 ? random() : random() % 60;
+        face.flags = random();
         for_each_predicted(image, [&](std::string_view id, std::span<const std::byte> records) {
             std::vector<std::byte> bytes(records.size());
             for (std::byte& b : bytes)

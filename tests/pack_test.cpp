@@ -3,6 +3,7 @@
 #include "format/pack_filter.h"
 #include "format/pack_reader.h"
 #include "format/pack_writer.h"
+#include "format/trim_texture.h"
 #include "synthetic_pack.h"
 
 #include <algorithm>
@@ -115,6 +116,36 @@ PackImage derived_image()
     derive_cells(image);
     derive_sdf(image);
     return image;
+}
+
+TEST(pack, a_compact_pack_makes_the_same_textures_of_every_kind)
+{
+    for (const TrimSource source : {TrimSource::Curve, TrimSource::Mask})
+        for (const TrimLayout layout : {TrimLayout::Isotropic, TrimLayout::Square})
+            for (const double bytes : {100.0, 20000.0}) {
+                PackImage image = derived_image();
+                allocate_trim_memory(image, bytes, {source, layout});
+                derive_sdf(image);
+                image.compact = true;
+                Result<LoadedPack> loaded = decode_pack(encode_pack(image, WriteOptions{}), ReadOptions{});
+                ASSERT_TRUE(loaded.ok()) << loaded.error().where << ": " << loaded.error().detail;
+                expect_same_image(loaded->image, image);
+            }
+}
+
+TEST(pack, texture_options_that_nobody_knows_are_refused)
+{
+    Bytes pack = encode_pack(synthetic_image(), WriteOptions{0}); // sections as they are
+    std::vector<SectionEntry> table = table_of(pack);
+    SectionEntry& facts = table.front();
+    ASSERT_EQ(std::memcmp(facts.id, "FACT", 4), 0);
+    ASSERT_EQ(facts.codec, 0);
+    FactRecord record;
+    std::memcpy(&record, &pack[facts.offset], sizeof record);
+    record.trim_textures = 4;
+    std::memcpy(&pack[facts.offset], &record, sizeof record);
+    facts.stored_xxh3 = facts.decoded_xxh3 = xxh3(&record, sizeof record);
+    EXPECT_EQ(first_finding(reseal(pack, header_of(pack), table)), 3237);
 }
 
 TEST(pack, a_compact_pack_becomes_the_full_one_at_load)
@@ -355,7 +386,15 @@ std::vector<HostileEdit> hostile_edits()
         {3222, "entries", [](M& m) { m.faces[2].entry_count = 3; }},
         {3223, "no end", [](M& m) { m.cell_entries[1].word &= ~kEntryLast; }},
         {3224, "cell", [](M& m) { m.cells[1] = kCellMixedCornerIn | 2u << 2; }},
-        {3225, "texture", [](M& m) { m.faces[2].sdf_size = 5u | 3u << 16; }},
+        {3225, "texture", [](M& m) { m.faces[2].sdf_size = 5u | 4u << 16; }},
+        {3225, "tile",
+         [](M& m) { // one tile, number 2 where there is one
+             m.faces[2].flags |= 1u << kFaceTileShiftBit;
+             m.faces[2].sdf_size = 3u | 3u << 16;
+             m.sdf_words[m.faces[2].sdf_first_word] = 3;
+         }},
+        {3238, "texture side", [](M& m) { m.faces[2].sdf_size = 5u; }},
+        {3238, "tile shift", [](M& m) { m.faces[2].flags |= 5u << kFaceTileShiftBit; }},
         {3226, "leaf rectangle", [](M& m) { m.leaves[1].uv_hi = 32769u | 1u << 16; }},
         {3227, "quaternion", [](M& m) { m.leaves[1].quat_xy = 0x7fff7fffu; }},
         {3230, "unreached node", [](M& m) { m.top_nodes.push_back(m.top_nodes[0]); }},
@@ -428,8 +467,10 @@ uint64_t walk(const PackImage& m)
                     break;
             }
         }
-        for (uint w = 0; f.sdf_size != 0 && w < ((f.sdf_size & 0xffff) + 3) / 4 * (f.sdf_size >> 16); ++w)
-            sum += m.sdf_words.at(f.sdf_first_word + w);
+        const TextureShape shape = texture_shape(f);
+        for (uint y = 0; y < shape.height; ++y)
+            for (uint x = 0; x < shape.width; ++x)
+                sum += texel_level(shape, m.sdf_words.data() + f.sdf_first_word, x, y);
     };
     if (m.top_nodes.empty())
         return 0;

@@ -128,22 +128,54 @@ def restore_pieces(content, contents):
     return struct.pack(f"<{len(words)}I", *words)
 
 
+def restore_texels(out, first, width, rows, shared):
+    for n in range(width * rows):
+        x, y = n % width, n // width
+        left = out[first + n - 1] if x else 0
+        upper = out[first + n - width] if y else 0
+        guess = left + upper
+        if x and y:
+            guess = max(0, min(255, guess - out[first + n - width - 1]))
+        known = shared(x, y)
+        out[first + n] = out[first + n] + (guess if known is None else known) & 255
+
+
+def restore_tiles(out, first, width, height, shift):
+    tiles_u, tiles_v = (max(width, 2) - 2 >> shift) + 1, (max(height, 2) - 2 >> shift) + 1
+    side, kept = (1 << shift) + 1, 0
+    below = [None] * tiles_u
+    for tile in range(tiles_u * tiles_v):
+        tx, ty, at = tile % tiles_u, tile // tiles_u, first + 2 * tile
+        entry, = struct.unpack_from("<H", out, at)
+        if entry < 2:
+            texel = lambda x, y, value=255 * entry: value
+        else:
+            begin = first + 2 * tiles_u * tiles_v + kept * side * side
+            need(begin + side * side <= len(out), "a tile outside SDFW")
+            struct.pack_into("<H", out, at, entry + kept & 0xFFFF)
+            restore_texels(out, begin, side, side, lambda x, y: left(side - 1, y) if x == 0 and tx else
+                           below[tx](x, side - 1) if y == 0 and ty else None)
+            texel = lambda x, y, begin=begin: out[begin + y * side + x]
+            kept += 1
+        left = below[tx] = texel
+    return 2 * tiles_u * tiles_v + kept * side * side
+
+
 def restore_textures(content, contents):
     out, end, faces = bytearray(content), 0, contents["FACE"]
     for at in range(0, len(faces), 136):
+        flags, = struct.unpack_from("<I", faces, at + 12)
         size, first_word = struct.unpack_from("<II", faces, at + 56)
-        width, first = ((size & 0xFFFF) + 3) // 4 * 4, 4 * first_word
-        count = width * (size >> 16)
-        if count == 0 or first < end or first + count > len(out):
+        width, height, shift, first = size & 0xFFFF, size >> 16, flags >> 8 & 7, 4 * first_word
+        if width == 0 or height == 0 or first < end or first > len(out):
             continue
-        for n in range(count):
-            left = out[first + n - 1] if n % width else 0
-            upper = out[first + n - width] if n >= width else 0
-            guess = left + upper
-            if n % width and n >= width:
-                guess = max(0, min(255, guess - out[first + n - width - 1]))
-            out[first + n] = out[first + n] + guess & 255
-        end = first + count
+        if shift:
+            count = restore_tiles(out, first, width, height, shift)
+        else:
+            count = max(width, 2) * height
+            need(first + count <= len(out), "a texture outside SDFW")
+            restore_texels(out, first, max(width, 2), height, lambda x, y: None)
+        end = first + (count + 3) // 4 * 4
     return bytes(out)
 
 

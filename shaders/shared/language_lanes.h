@@ -213,6 +213,12 @@ FN integer min(integer a, integer b)
     TRIMRAY_EACH_PART r.v[i] = hn::Min(a.v[i], b.v[i]);
     return r;
 }
+FN integer max(integer a, integer b)
+{
+    integer r;
+    TRIMRAY_EACH_PART r.v[i] = hn::Max(a.v[i], b.v[i]);
+    return r;
+}
 FN integer operator>>(integer a, integer b)
 {
     integer r;
@@ -299,6 +305,14 @@ FN integer gather(const uint* base, integer index)
 {
     integer r;
     TRIMRAY_EACH_PART r.v[i] = hn::GatherIndex(IntegerTag(), base, hn::BitCast(SignedTag(), index.v[i]));
+    return r;
+}
+
+/// Words whose lowest byte is byte `at` from base on, at any offset.
+FN integer gather_bytes(const uint* base, integer at)
+{
+    integer r;
+    TRIMRAY_EACH_PART r.v[i] = hn::GatherOffset(IntegerTag(), base, hn::BitCast(SignedTag(), at.v[i]));
     return r;
 }
 

@@ -12,8 +12,8 @@
 
 SHARED_OPEN
 
-// Data comes through fetch_sdf_word, a lane each, and fetch_cell, fetch_entry_word, fetch_entry_eta and
-// fetch_trim_point (index in points), the same for all lanes: a cell is asked for the lanes in it.
+// Data comes through fetch_sdf_word and fetch_sdf_pair, a lane each, and fetch_cell, fetch_entry_word, fetch_entry_eta
+// and fetch_trim_point (index in points), the same for all lanes: a cell is asked for the lanes in it.
 
 // The constants of one face
 struct TrimFace {
@@ -22,9 +22,6 @@ struct TrimFace {
     uint first_cell;
     uint first_entry;
     uint first_point;
-    uint sdf_width; // 0: no texture
-    uint sdf_height;
-    uint sdf_first_word;
 };
 
 FN TrimFace trim_face(FaceRecord face)
@@ -35,9 +32,6 @@ FN TrimFace trim_face(FaceRecord face)
     trim.first_cell = face.first_cell;
     trim.first_entry = face.first_entry;
     trim.first_point = face.first_point;
-    trim.sdf_width = face.sdf_size & 0xffffu;
-    trim.sdf_height = face.sdf_size >> 16;
-    trim.sdf_first_word = face.sdf_first_word;
     return trim;
 }
 
@@ -160,32 +154,110 @@ FN mask entry_crossed(FETCH_PARAM TrimFace face, uint word, scalar eta, real2 uv
     return horizontal;
 }
 
-// Signed distance in texels at uv_face, positive inside: one bilinear look-up in the 8-bit texture
-FN real sdf_texel(FETCH_PARAM TrimFace face, integer x, integer y)
+// ---- distance textures: SPEC.md, "Distance textures" ---------------------------------------------------------------
+
+// The constants of a face's texture
+struct SdfFace {
+    uint first_word;
+    uint tile_shift;
+    uint stride;    // bytes from one row to the next
+    uint upper_row; // the same, 0 where there is one row
+    uint tiles_u;
+    uint first_tile;  // byte at which tiles begin
+    uint last_column; // at which a look-up may begin
+    uint last_row;
+    scalar2 scale; // a point's place among the texels: scale * uv - inset, from 0 to end
+    scalar inset;
+    scalar2 end;
+};
+
+// Domain: face.sdf_size != 0
+FN SdfFace sdf_face(FaceRecord face)
 {
-    integer words_per_row = integer((face.sdf_width + 3u) >> 2);
-    integer word = fetch_sdf_word(FETCH_PASS integer(face.sdf_first_word) + y * words_per_row + (x >> integer(2u)));
-    integer byte = (word >> ((x & integer(3u)) << integer(3u))) & integer(0xffu);
-    return to_real(byte) - 128.0f;
+    uint width = face.sdf_size & 0xffffu;
+    uint height = face.sdf_size >> 16;
+    SdfFace sdf;
+    sdf.first_word = face.sdf_first_word;
+    sdf.tile_shift = (face.flags >> kFaceTileShiftBit) & kFaceTileShiftMask;
+    sdf.last_column = width > 2u ? width - 2u : 0u;
+    sdf.last_row = height > 2u ? height - 2u : 0u;
+    sdf.stride = sdf.tile_shift > 0u ? (1u << sdf.tile_shift) + 1u : sdf.last_column + 2u;
+    sdf.upper_row = sdf.tile_shift > 0u || height > 1u ? sdf.stride : 0u;
+    sdf.tiles_u = (sdf.last_column >> sdf.tile_shift) + 1u;
+    sdf.first_tile = 2u * sdf.tiles_u * ((sdf.last_row >> sdf.tile_shift) + 1u);
+    sdf.inset = (face.flags & kFaceTexelCentres) != 0u ? 0.5f : kSdfInset;
+    sdf.end = scalar2(scalar(width - 1u), scalar(height - 1u));
+    sdf.scale = scalar2(sdf.end.x + 2.0f * sdf.inset, sdf.end.y + 2.0f * sdf.inset);
+    return sdf;
 }
-FN real sdf_distance(FETCH_PARAM TrimFace face, real2 uv)
+
+// The four texels around a point, in quanta, and where between them it lies
+struct SdfCell {
+    real d00;
+    real d10;
+    real d01;
+    real d11;
+    real2 f;
+};
+FN real sdf_level(integer pair, uint which)
 {
-    // texel centres at (i + 0.5) / width; beyond the outer centres the border texel goes on
-    PRECISE real x = clamp(uv.x * scalar(face.sdf_width) - 0.5f, real(0.0f), real(scalar(face.sdf_width) - 1.0f));
-    PRECISE real y = clamp(uv.y * scalar(face.sdf_height) - 0.5f, real(0.0f), real(scalar(face.sdf_height) - 1.0f));
-    integer i = to_integer(x);
-    integer j = to_integer(y);
-    integer i1 = min(i + integer(1u), integer(face.sdf_width - 1u));
-    integer j1 = min(j + integer(1u), integer(face.sdf_height - 1u));
-    PRECISE real fx = x - to_real(i);
-    PRECISE real fy = y - to_real(j);
-    real d00 = sdf_texel(FETCH_PASS face, i, j);
-    real d10 = sdf_texel(FETCH_PASS face, i1, j);
-    real d01 = sdf_texel(FETCH_PASS face, i, j1);
-    real d11 = sdf_texel(FETCH_PASS face, i1, j1);
-    PRECISE real lower = d00 + (d10 - d00) * fx;
-    PRECISE real upper = d01 + (d11 - d01) * fx;
-    return (lower + (upper - lower) * fy) * kSdfTexelQuantum;
+    return to_real((pair >> integer(8u * which)) & integer(0xffu)) - 128.0f;
+}
+// Fetches: rows two; tiles one for their entry, and two more where a lane's tile is kept
+FN SdfCell sdf_cell(FETCH_PARAM SdfFace face, real2 uv)
+{
+    // between the domain's border and the outer texels these go on
+    PRECISE real x = clamp(uv.x * face.scale.x - face.inset, real(0.0f), real(face.end.x));
+    PRECISE real y = clamp(uv.y * face.scale.y - face.inset, real(0.0f), real(face.end.y));
+    integer i = min(to_integer(x), integer(face.last_column));
+    integer j = min(to_integer(y), integer(face.last_row));
+    integer lower;
+    integer upper;
+    if (face.tile_shift == 0u) {
+        integer at = j * integer(face.stride) + i;
+        lower = fetch_sdf_pair(FETCH_PASS face.first_word, at);
+        upper = fetch_sdf_pair(FETCH_PASS face.first_word, at + integer(face.upper_row));
+    } else {
+        integer shift = integer(face.tile_shift);
+        integer inner = integer((1u << face.tile_shift) - 1u);
+        integer tile = (j >> shift) * integer(face.tiles_u) + (i >> shift);
+        integer entries = fetch_sdf_word(FETCH_PASS face.first_word, tile >> integer(1u)); // two of 16 bits
+        integer entry = (entries >> ((tile & integer(1u)) << integer(4u))) & integer(0xffffu);
+        mask kept = integer(kFirstTile - 1u) < entry;
+        lower = select(entry == integer(kTileIn), integer(0xffffu), integer(0u));
+        upper = lower;
+        if (any_lane(kept)) {
+            integer at = integer(face.first_tile) + (entry - integer(kFirstTile)) * integer(face.stride * face.stride) +
+                         (j & inner) * integer(face.stride) + (i & inner);
+            at = select(kept, at, integer(0u));
+            lower = select(kept, fetch_sdf_pair(FETCH_PASS face.first_word, at), lower);
+            upper = select(kept, fetch_sdf_pair(FETCH_PASS face.first_word, at + integer(face.stride)), upper);
+        }
+    }
+    SdfCell cell;
+    cell.d00 = sdf_level(lower, 0u);
+    cell.d10 = sdf_level(lower, 1u);
+    cell.d01 = sdf_level(upper, 0u);
+    cell.d11 = sdf_level(upper, 1u);
+    cell.f = real2(x - to_real(i), y - to_real(j));
+    return cell;
+}
+
+FN real sdf_interpolated(SdfCell cell)
+{
+    PRECISE real lower = cell.d00 + (cell.d10 - cell.d00) * cell.f.x;
+    PRECISE real upper = cell.d01 + (cell.d11 - cell.d01) * cell.f.x;
+    return (lower + (upper - lower) * cell.f.y) * kSdfTexelQuantum;
+}
+
+// Signed distance in texels at uv_face, between -128 and 127 quanta: farther ones read as these
+FN real sdf_distance(FETCH_PARAM SdfFace face, real2 uv)
+{
+    return sdf_interpolated(sdf_cell(FETCH_PASS face, uv));
+}
+FN mask sdf_inside(real distance_texels)
+{
+    return distance_texels >= 0.0f;
 }
 
 SHARED_CLOSE

@@ -127,7 +127,7 @@ inline TrimErrors errors_of(const TrimmedPlane& plane, const RenderOptions& opti
                             const PlaneView& view)
 {
     const CameraRays rays = camera_rays(options.camera, options.width, options.height);
-    const uint texels = plane.face().sdf_size & 0xffffu; // the plane's texture is square
+    const double texels = plane.face().sdf_size != 0 ? kPlaneSide_mm / plane.face().sdf_texel_mm : 0;
     TrimErrors errors;
     for (uint32_t y = 0; y < options.height; ++y)
         for (uint32_t x = 0; x < options.width; ++x) {
