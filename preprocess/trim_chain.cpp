@@ -181,7 +181,7 @@ bool join(CurvePiece& before, CurvePiece& after, Vec2d offset, const CadFace& fa
     report.largest_gap_mm = std::max(report.largest_gap_mm, gap_mm);
     if (flat_mm > kJoinTolerances * metric.tolerance_mm) {
         filler = line_piece(a, b);
-        filler.grow_mm = 0; // no neighbour there
+        filler.grow_mm = std::max({before.grow_mm, after.grow_mm, 0.0}); // the corner is its neighbours'
         if (gap_mm > std::max(face.tolerance_mm, kJoinTolerances * metric.tolerance_mm)) {
             report.had_open_loop = true;
             report.findings.push_back({TrimFindingKind::OpenLoop, a, gap_mm, report.loop, report.loop});

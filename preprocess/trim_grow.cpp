@@ -69,12 +69,14 @@ MonotonePiece monotone(const CurvePiece& piece)
 /// Which side of a loop is inside: left of its pieces' direction, right, or now one and now the other.
 enum class Inside { Left, Right, Mixed };
 
-/// The even-odd rule beside the middle of some pieces of the loop.
+/// The even-odd rule beside the middle of some pieces of the loop, weighed by their lengths: a line that closes a gap
+/// may run backwards.
 Inside inside_of(const Pieces& loop, const Pieces& all)
 {
-    constexpr size_t kSamples = 7;
+    constexpr size_t kSamples = 32;
+    constexpr double kNoMoreThan = 0.02; // of the length may say otherwise
     constexpr double kCoincident = 1e-9; // uv_face
-    int left = 0, right = 0;
+    double left = 0, right = 0;
     for (size_t k = 0; k < std::min(kSamples, loop.size()); ++k) {
         const CurvePiece& piece = loop[k * loop.size() / std::min(kSamples, loop.size())];
         const MonotonePiece m = monotone(piece);
@@ -95,11 +97,11 @@ Inside inside_of(const Pieces& loop, const Pieces& all)
             continue; // walked twice, with no side of its own
         // `odd`: the side of larger u (steep) or v is inside
         const bool positive_is_left = steep ? along.y < 0 : along.x > 0;
-        ++(odd == positive_is_left ? left : right);
+        (odd == positive_is_left ? left : right) += length(along);
     }
-    if ((left > 0) == (right > 0))
+    if (!(std::min(left, right) <= kNoMoreThan * (left + right)) || left == right)
         return Inside::Mixed;
-    return left > 0 ? Inside::Left : Inside::Right;
+    return left > right ? Inside::Left : Inside::Right;
 }
 
 /// The first fundamental form at a point, in mm per uv_face.

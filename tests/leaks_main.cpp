@@ -56,23 +56,7 @@ int measure(const std::string& path, const Request& request)
             fmt::print("{}: {}\n", path, tracer.error().detail);
             return 1;
         }
-        hard::Bounds bounds;
-        for (const FaceRecord& face : scene->pack.image.faces)
-            (void)face;
-        for (const InstanceRecord& instance : scene->pack.image.instances) {
-            const PartRecord& part = scene->pack.image.parts[instance.part];
-            for (int corner = 0; corner < 8; ++corner) {
-                const double p[3] = {part.origin_mm[0] + part.scale_mm * (corner & 1 ? 1 : -1),
-                                     part.origin_mm[1] + part.scale_mm * (corner & 2 ? 1 : -1),
-                                     part.origin_mm[2] + part.scale_mm * (corner & 4 ? 1 : -1)};
-                for (size_t r = 0; r < 3; ++r) {
-                    const double* t = instance.transform + 4 * r;
-                    const double x = t[0] * p[0] + t[1] * p[1] + t[2] * p[2] + t[3];
-                    bounds.lo[r] = std::min(bounds.lo[r], x);
-                    bounds.hi[r] = std::max(bounds.hi[r], x);
-                }
-            }
-        }
+        const hard::Bounds bounds = hard::bounds_of(scene->pack.image);
         const hard::ClosedModel closed(scene, 4 * tolerance_mm + request.rim * bounds.diagonal());
         if (views.empty())
             views = hard::leak_views(**tracer, *scene, bounds, request.around, request.close_ups, request.pixels);

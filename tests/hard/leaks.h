@@ -10,9 +10,9 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <functional>
+#include <memory>
+#include <numbers>
 #include <random>
-#include <string>
 #include <vector>
 
 namespace trimray::hard {
@@ -100,11 +100,18 @@ private:
         const FaceRecord& face = scene_->pack.image.faces[id];
         const double u = (u_file - face.domain_lo[0]) / (face.domain_hi[0] - face.domain_lo[0]);
         const double v = (v_file - face.domain_lo[1]) / (face.domain_hi[1] - face.domain_lo[1]);
-        double mm = std::min(
-            {u * face.extent_mm[0], (1 - u) * face.extent_mm[0], v * face.extent_mm[1], (1 - v) * face.extent_mm[1]});
-        if ((face.flags & kFaceNaturalBorder) == 0)
-            mm = std::min(mm, reference_.distance(id, u, v, {face.extent_mm[0], 0, 0, face.extent_mm[1]}));
-        return mm <= rim_mm_;
+        // a border within the rim has the outside near the hit: at one of these places, if it is no hair-thin slot
+        constexpr int kAround = 16;
+        for (const double radius : {1.0, 0.3})
+            for (int k = 0; k < kAround; ++k) {
+                const double angle = 2 * std::numbers::pi * k / kAround;
+                const double a = u + radius * rim_mm_ * std::cos(angle) / double(face.extent_mm[0]);
+                const double b = v + radius * rim_mm_ * std::sin(angle) / double(face.extent_mm[1]);
+                if (a < 0 || b < 0 || a > double(kUvBelowOne) || b > double(kUvBelowOne) ||
+                    !reference_.inside(id, a, b))
+                    return true;
+            }
+        return false;
     }
 
     std::shared_ptr<const Scene> scene_;
@@ -123,6 +130,25 @@ struct Bounds {
     Point middle() const { return 0.5 * (lo + hi); }
     double diagonal() const { return std::sqrt(dot(hi - lo, hi - lo)); }
 };
+
+/// Of the boxes around all placed parts.
+inline Bounds bounds_of(const PackImage& image)
+{
+    Bounds bounds;
+    for (const InstanceRecord& instance : image.instances) {
+        const PartRecord& part = image.parts[instance.part];
+        for (unsigned corner = 0; corner < 8; ++corner)
+            for (size_t row = 0; row < 3; ++row) {
+                const double* t = instance.transform + 4 * row;
+                double x = t[3];
+                for (size_t c = 0; c < 3; ++c)
+                    x += t[c] * (part.origin_mm[c] + (corner >> c & 1u ? part.scale_mm : -part.scale_mm));
+                bounds.lo[row] = std::min(bounds.lo[row], x);
+                bounds.hi[row] = std::max(bounds.hi[row], x);
+            }
+    }
+    return bounds;
+}
 
 inline Point point_of(const Frame& frame, const CameraRays& rays, uint32_t x, uint32_t y)
 {

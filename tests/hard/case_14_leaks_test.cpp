@@ -1,0 +1,194 @@
+// Gaps between neighbouring faces: none shows the inside of a closed solid.
+#include "format/pack_reader.h"
+#include "format/pack_writer.h"
+#include "preprocess/bezier_patch.h"
+#include "preprocess/build_pack.h"
+#include "preprocess/cad_import.h"
+#include "preprocess/vec3d.h"
+#include "tests/hard/leaks.h"
+#include "tests/keep_vulkan_loaded.h"
+#include "tests/occt_solids.h"
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <iostream>
+#include <random>
+#include <unistd.h>
+
+namespace trimray::hard {
+namespace {
+
+constexpr double kRim = 1e-5; // of the diagonal: rounding and the tracers' slack at a domain's border
+constexpr uint32_t kPixels = 256, kMovedPixels = 192, kVulkanPixels = 48;
+
+std::optional<CadModel> model_of(oracle::Solid solid)
+{
+    const auto path = std::filesystem::temp_directory_path() / fmt::format("trimray_leaks_{}.brep", getpid());
+    if (!oracle::write_closed_solid(solid, path.string()))
+        return std::nullopt;
+    ImportOptions options;
+    options.proxy_deflection = 0;
+    Result<CadModel> model = import_cad(path.string(), options, {});
+    std::filesystem::remove(path);
+    if (!model.ok())
+        return std::nullopt;
+    return std::move(*model);
+}
+
+std::shared_ptr<const Scene> scene_of(const CadModel& model, bool grow)
+{
+    BuildOptions options;
+    options.trims.grow = grow;
+    BuildReport report;
+    const PackImage image = build_pack(model, options, report);
+    EXPECT_EQ(report.faces, report.converted);
+    Result<LoadedPack> pack = decode_pack(encode_pack(image, {}), {});
+    if (!pack.ok()) {
+        ADD_FAILURE() << pack.error().where << ": " << pack.error().detail;
+        return nullptr;
+    }
+    auto scene = std::make_shared<Scene>();
+    scene->pack = std::move(pack).value();
+    return scene;
+}
+
+/// Counts in pictures of all `views`, from outside and from within.
+struct Counts {
+    LeakCount outside, inside;
+};
+
+Counts count(Tracer& tracer, const ClosedModel& closed, const std::vector<LeakView>& views, TrimMode mode,
+             uint32_t pixels)
+{
+    Counts counts;
+    for (const LeakView& view : views) {
+        RenderOptions options;
+        options.width = options.height = pixels;
+        options.camera = view.camera;
+        options.trim = mode;
+        options.shade = false;
+        RenderStats stats;
+        const Result<Frame> frame = tracer.render(options, stats);
+        if (!frame.ok()) {
+            ADD_FAILURE() << frame.error().where << ": " << frame.error().detail;
+            return counts;
+        }
+        (view.inside ? counts.inside : counts.outside) += closed.count(options, *frame, view.inside);
+    }
+    return counts;
+}
+
+/// What each mode leaks of a model, its borders as they are and grown. Both tracers are asked; the views are those of
+/// the grown model.
+struct Leaks {
+    Counts as_is, grown;
+};
+
+Leaks measure(const CadModel& model, const std::string& name, double tolerance_mm, uint32_t pixels)
+{
+    Leaks leaks;
+    std::vector<LeakView> views;
+    for (const bool grow : {true, false}) {
+        const auto scene = scene_of(model, grow);
+        if (!scene)
+            return leaks;
+        const Bounds bounds = bounds_of(scene->pack.image);
+        const ClosedModel closed(scene, kRim * bounds.diagonal() + 8 * tolerance_mm);
+        auto cpu = make_cpu_tracer(scene);
+        EXPECT_TRUE(cpu.ok());
+        if (views.empty())
+            views = leak_views(**cpu, *scene, bounds, 2, 4, pixels);
+        EXPECT_GE(std::count_if(views.begin(), views.end(), [](const LeakView& view) { return view.inside; }), 6)
+            << name;
+        for (const TrimMode mode : {TrimMode::Exact, TrimMode::Hybrid}) {
+            const Counts counts = count(**cpu, closed, views, mode, pixels);
+            std::cout << fmt::format("{}, {}, borders {}: outside {} leaks, {} at rims, {} grazing of {} rays; "
+                                     "inside {} of {}\n",
+                                     name, mode == TrimMode::Exact ? "exact" : "hybrid", grow ? "grown" : "as is",
+                                     counts.outside.leaks, counts.outside.rims, counts.outside.grazing,
+                                     counts.outside.rays, counts.inside.leaks, counts.inside.rays);
+            if (grow) {
+                EXPECT_EQ(counts.outside.leaks, 0) << name;
+                EXPECT_EQ(counts.inside.leaks, 0) << name;
+            }
+            (grow ? leaks.grown : leaks.as_is) = counts;
+        }
+        if (!grow)
+            continue;
+        auto vulkan = make_vulkan_tracer(scene, true, false);
+        if (!vulkan.ok()) {
+            std::cout << "skipped vulkan: " << vulkan.error().detail << "\n";
+            continue;
+        }
+        for (const TrimMode mode : {TrimMode::Exact, TrimMode::Hybrid}) {
+            const Counts counts = count(**vulkan, closed, views, mode, kVulkanPixels);
+            EXPECT_EQ(counts.outside.leaks, 0) << name << " vulkan";
+            EXPECT_EQ(counts.inside.leaks, 0) << name << " vulkan";
+        }
+    }
+    return leaks;
+}
+
+/// Moves the loops of every face by up to `most_mm`, and says so as the importer would.
+void move_pcurves(CadModel& model, double most_mm, double tolerance_mm)
+{
+    std::mt19937 rng(3);
+    std::uniform_real_distribution<double> uniform(-1, 1);
+    for (CadPart& part : model.parts) {
+        for (CadEdge& edge : part.edges)
+            edge.tolerance_mm = tolerance_mm;
+        for (CadFace& face : part.faces) {
+            face.tolerance_mm = tolerance_mm;
+            const double angle = 3.14159265358979 * uniform(rng);
+            bool pole = false;
+            for (const CadLoop& loop : face.loops)
+                for (const CadEdgeUse& use : loop)
+                    pole |= use.degenerate;
+            const double mm = pole ? 0 : most_mm * uniform(rng); // a pole is where the surface says
+            for (CadLoop& loop : face.loops)
+                for (CadEdgeUse& use : loop) {
+                    use.gap_mm = use.seam || use.degenerate ? 0 : 2 * most_mm; // both neighbours'
+                    const auto& p = use.pcurve.control_points[use.pcurve.control_points.size() / 2];
+                    const SurfaceDerivatives s = evaluate(face.surface, p[0] / p[2], p[1] / p[2]);
+                    for (auto& point : use.pcurve.control_points) {
+                        point[0] += mm * std::cos(angle) / norm(s.du) * point[2];
+                        point[1] += mm * std::sin(angle) / norm(s.dv) * point[2];
+                    }
+                }
+        }
+    }
+}
+
+class Leaks14 : public testing::TestWithParam<oracle::Solid> {};
+
+TEST_P(Leaks14, NoRayPassesBetweenTheFacesOfAClosedSolid)
+{
+    keep_vulkan_loaded();
+    const auto model = model_of(GetParam());
+    ASSERT_TRUE(model) << "the kernel made no closed solid";
+    measure(*model, oracle::solid_name(GetParam()), 0, kPixels);
+}
+
+TEST_P(Leaks14, NorWherePcurvesAreOffWithinTheTolerance)
+{
+    keep_vulkan_loaded();
+    constexpr double kTolerance_mm = 0.1; // 1e-3 of the size
+    auto model = model_of(GetParam());
+    ASSERT_TRUE(model) << "the kernel made no closed solid";
+    move_pcurves(*model, 0.9 * kTolerance_mm, kTolerance_mm);
+    const Leaks leaks = measure(*model, std::string(oracle::solid_name(GetParam())) + " with pcurves moved",
+                                kTolerance_mm, kMovedPixels);
+    EXPECT_GT(leaks.as_is.outside.leaks + leaks.as_is.inside.leaks, 1000) << "the test shows nothing";
+}
+
+INSTANTIATE_TEST_SUITE_P(case_14, Leaks14, testing::ValuesIn(oracle::kSolids),
+                         [](const testing::TestParamInfo<oracle::Solid>& info) {
+                             std::string name = oracle::solid_name(info.param);
+                             std::replace(name.begin(), name.end(), ' ', '_');
+                             return name;
+                         });
+
+} // namespace
+} // namespace trimray::hard

@@ -1,0 +1,27 @@
+// Closed solids made with the CAD kernel, written as BREP.
+#pragma once
+
+#include <string>
+
+namespace trimray::oracle {
+
+enum class Solid {
+    Box,
+    RoundedBox,      // all edges filleted: spheres and cylinders that meet with one tangent plane
+    DrilledCylinder, // a through hole across, two blind holes
+    SphereAndTorus,  // fused
+    RevolvedSpline,
+    Loft, // splines through sections
+};
+inline constexpr Solid kSolids[] = {
+    Solid::Box, Solid::RoundedBox, Solid::DrilledCylinder, Solid::SphereAndTorus, Solid::RevolvedSpline, Solid::Loft};
+const char* solid_name(Solid solid);
+
+/// One solid, about 100 mm in size, along no axis. False: not made, or not valid and closed by the kernel's own check.
+bool write_closed_solid(Solid solid, const std::string& path);
+
+/// A cylinder of radius 20 and height 60 around z, with a hole of radius 8 drilled through its wall along x; its seam
+/// is turned by `turn` radians from the hole. False: not made.
+bool write_drilled_seam(double turn, const std::string& path);
+
+} // namespace trimray::oracle
