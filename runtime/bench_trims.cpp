@@ -4,13 +4,13 @@
 #include "runtime/command_json.h"
 #include "runtime/command_trace.h"
 #include "runtime/cpu_lanes.h"
+#include "runtime/thread_clock.h"
 #include "runtime/trim_mode.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <bit>
-#include <chrono>
 #include <limits>
 #include <utility>
 
@@ -100,13 +100,13 @@ public:
     /// Seconds to answer all of them once, and how many answers are wrong.
     std::pair<double, uint64_t> run(const CpuScene& scene, TrimMode mode)
     {
-        const auto start = std::chrono::steady_clock::now();
+        const double start = thread_cpu_seconds();
         answer_(scene, mode, queries_, inside_);
-        const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - start;
+        const double spent = thread_cpu_seconds() - start;
         uint64_t wrong = 0;
         for (size_t i = 0; i < queries_.size(); ++i)
             wrong += static_cast<uint64_t>(std::popcount((inside_[i] ^ queries_[i].inside) & queries_[i].asked));
-        return {spent.count(), wrong};
+        return {spent, wrong};
     }
 
     uint64_t asked() const { return asked_; }
@@ -200,7 +200,7 @@ Result<TrimView> measure_view(const std::string& name, const Camera& camera, con
             const Result<Frame> frame = contestant.tracer->render(render, stats);
             if (!frame.ok())
                 return frame.error();
-            times[i].frame_ms.push_back(stats.frame_ms.back());
+            times[i].frame_ms.push_back(stats.frame_cpu_ms.empty() ? stats.frame_ms.back() : stats.frame_cpu_ms.back());
             const auto [seconds, wrong] = queries.run(*contestant.scene->prepared, contestant.setting.mode);
             times[i].query_seconds = std::min(times[i].query_seconds, seconds);
             view.figures[i].wrong_queries = wrong;

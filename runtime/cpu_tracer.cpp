@@ -1,5 +1,6 @@
 #include "runtime/cpu_lanes.h"
 #include "runtime/frame_effects.h"
+#include "runtime/thread_clock.h"
 #include "runtime/tracer.h"
 #include "runtime/trim_mode.h"
 
@@ -82,6 +83,7 @@ public:
         stats.trim = *trim;
         stats.kd_bytes = *trim == TrimMode::Kd ? cpu_scene_->kd_trims()->size_bytes() : 0;
         stats.frame_ms.clear();
+        stats.frame_cpu_ms.clear();
         stats.trim_queries.clear();
         if (*trim == TrimMode::Reference && reference_ == nullptr)
             reference_ = std::make_unique<const TrimReference>(scene_->pack.image);
@@ -92,9 +94,12 @@ public:
         tbb::task_arena arena(threads);
         for (uint32_t i = 0; i < std::max(options.frames, 1u); ++i) {
             const auto start = std::chrono::steady_clock::now();
+            const double cpu_start = thread_cpu_seconds();
             stats.work = render_once(options, stats.trim, threads, arena, frame);
             const std::chrono::duration<double, std::milli> spent = std::chrono::steady_clock::now() - start;
             stats.frame_ms.push_back(spent.count());
+            if (threads == 1)
+                stats.frame_cpu_ms.push_back(1e3 * (thread_cpu_seconds() - cpu_start));
             take_queries(stats.trim_queries);
         }
         return frame;

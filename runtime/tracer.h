@@ -89,7 +89,9 @@ struct WorkCounts {
 struct RenderStats {
     std::string device;
     std::vector<double> frame_ms; // tracing and shading, not loading or compiling
-    WorkCounts work;              // of one frame
+    // processor time of the same, on the CPU with one thread: what other programs take is not in it. Otherwise empty
+    std::vector<double> frame_cpu_ms;
+    WorkCounts work; // of one frame
     TrimMode trim = TrimMode::Exact;
     uint64_t kd_bytes = 0;                 // of the kd-trees, in the mode kd; otherwise there are none
     std::vector<TrimQueries> trim_queries; // of one frame, if asked for; on one thread in the order in which they came
