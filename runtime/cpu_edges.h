@@ -44,9 +44,8 @@ public:
         alignas(64) uint leaves[kLanes], instances[kLanes];
         store(hit.leaf, leaves);
         store(hit.instance, instances);
-        const mask first = hit.leaf == integer(leaves[0]) && hit.instance == integer(instances[0]);
-        if (hit_lanes == 0xffffu && lane_bits(first) == 0xffffu &&
-            far_from_borders(image_.patches[image_.leaves[leaves[0]].patch].face, hit.uv_face))
+        if (hit_lanes == 0xffffu && one_face(hit, leaves, instances[0]) &&
+            far_from_borders(face_of(leaves[0]), hit.uv_face))
             return;
         const real2 here(real(0.0f), real(0.0f));
         Nearest line{here, real(kHuge), real(1.0f)}, border{here, real(kHuge), real(1.0f)};
@@ -80,6 +79,23 @@ private:
     static bool contains(const UvBox& outer, const UvBox& inner)
     {
         return inner.u0 > outer.u0 && inner.u1 < outer.u1 && inner.v0 > outer.v0 && inner.v1 < outer.v1;
+    }
+
+    uint face_of(uint leaf) const { return image_.patches[image_.leaves[leaf].patch].face; }
+
+    /// Whether 16 hits are all of one face, of one leaf or of several.
+    HWY_ATTR bool one_face(const PacketHit& hit, const uint (&leaves)[kLanes], uint instance) const
+    {
+        if (lane_bits(hit.instance == integer(instance)) != 0xffffu)
+            return false;
+        uint others = ~lane_bits(hit.leaf == integer(leaves[0])) & 0xffffu;
+        for (const uint face = face_of(leaves[0]); others != 0;) {
+            const uint leaf = leaves[__builtin_ctz(others)];
+            if (face_of(leaf) != face)
+                return false;
+            others &= ~lane_bits(hit.leaf == integer(leaf));
+        }
+        return true;
     }
 
     /// Writes the words of what lies within reach; false: nothing does.
@@ -258,7 +274,7 @@ private:
     HWY_ATTR void find_in_leaf(const Packet& packet, const PacketHit& hit, uint leaf, uint instance, uint lanes,
                                Nearest& line, Nearest& border)
     {
-        const uint face_id = image_.patches[image_.leaves[leaf].patch].face;
+        const uint face_id = face_of(leaf);
         const FaceRecord& face = image_.faces[face_id];
         const Asked asked = asked_of(packet, hit, leaf, instance, lanes);
         const real2 reach = reach_in_uv(asked.map, job_.edges->query.reach_px());

@@ -40,6 +40,16 @@ uint32_t word_of(float x, float y)
     return coordinate(x) | coordinate(y) << 14 | 15u << 28;
 }
 
+/// A border word's mark of a strip too thin to be drawn by itself; its offset is kept, its strength reads 0.
+uint32_t thin_word(uint32_t word)
+{
+    return (word & 0x0fffffffu) | 1u << 28;
+}
+bool is_thin_word(uint32_t word)
+{
+    return word >> 28 == 1;
+}
+
 /// How much of a pixel a line of `width` covers whose middle passes at `distance`, pixels: what is summed over the
 /// pixels across a line is its width. Eq. 7's smooth function.
 float line_coverage(float distance, float width)
@@ -80,13 +90,13 @@ struct Painted {
     std::array<float, 4> rgba;
 };
 
-constexpr uint32_t kBandRows = 32; // a multiple of a packet's 4
+constexpr uint32_t kBandRows = 64; // a multiple of a packet's 4
 
-/// One band's marks, in packets as in EdgeMap; only what `dirty` names holds anything.
+/// One band's marks, packet by packet where there are any.
 struct BandMarks {
-    std::vector<Mark> marks;
-    std::vector<uint8_t> is_dirty;
-    std::vector<uint32_t> dirty;
+    std::vector<uint32_t> place; // in `packets`, by packet of the band; kNone: no marks
+    std::vector<uint32_t> packets;
+    std::vector<Mark> marks; // 16 a packet
 };
 
 class Effects {
@@ -145,7 +155,11 @@ private:
     void draw_line(BandMarks& band, int x, int y, Offset offset, int y0, int y1) const;
     void cover(BandMarks& band, int x, int y, Offset offset, int y0, int y1) const;
     bool is_outline(int x, int y, Offset offset) const;
+    bool is_thin(int x, int y) const;
+    bool ends_before(int x, int y, int tx, int ty) const;
     static bool stands_for(Offset line, Offset border);
+    void fetch_early(uint32_t column, uint32_t row) const;
+    bool has_line_towards(int x, int y, int dx, int dy) const;
     std::array<float, 4> color(size_t i) const;
     std::array<float, 3> line_color(size_t i) const;
 
@@ -278,7 +292,8 @@ void Effects::find_rims(uint32_t band)
             Offset border{0, 0, 0};
             if (near && word != 0)
                 border = offset_of(word);
-            const bool outlined = border.strength > 0 && is_outline(x, y, border);
+            const auto [bx, by] = beyond(x, y, border);
+            const bool outlined = border.strength > 0 && on_picture(bx, by) && hides(x, y, bx, by);
             float ox = 0, oy = 0;
             const bool rim = is_rim(x, y, ox, oy);
             const bool has_line =
@@ -287,6 +302,15 @@ void Effects::find_rims(uint32_t band)
                 continue;
             if (!rim && !ends_here(x, y, ox, oy))
                 continue;
+            // a strip of about a pixel between a border and a rim comes and goes along the rim: the border
+            // stands for both
+            constexpr float kThinnest = 1.3f;
+            const bool thin = border.strength > 0 && border.x * ox + border.y * oy < 0 &&
+                              border.length() + std::hypot(ox, oy) < kThinnest;
+            if (thin) {
+                word = thin_word(word);
+                continue;
+            }
             if (!near) {
                 std::fill_n(&map_.border[16 * packet], 16, 0u);
                 map_.near[packet] |= kNearBorder;
@@ -301,12 +325,13 @@ Mark* Effects::mark(BandMarks& band, int x, int y, int y0, int y1) const
         return nullptr;
     const size_t word = map_.word_of(uint32_t(x), uint32_t(y - y0));
     const size_t packet = word / 16;
-    if (!band.is_dirty[packet]) {
-        band.is_dirty[packet] = 1;
-        band.dirty.push_back(static_cast<uint32_t>(packet));
-        std::fill_n(&band.marks[16 * packet], 16, Mark{});
+    uint32_t& place = band.place[packet];
+    if (place == kNone) {
+        place = static_cast<uint32_t>(band.packets.size());
+        band.packets.push_back(static_cast<uint32_t>(packet));
+        band.marks.resize(band.marks.size() + 16);
     }
-    return &band.marks[word];
+    return &band.marks[size_t{16} * place + word % 16];
 }
 
 /// The first pixel beyond the border at `offset` of (x, y), along the axis nearest to its normal.
@@ -323,7 +348,31 @@ std::array<int, 2> Effects::beyond(int x, int y, Offset offset) const
 bool Effects::is_outline(int x, int y, Offset offset) const
 {
     const auto [tx, ty] = beyond(x, y, offset);
-    return on_picture(tx, ty) && hides(x, y, tx, ty);
+    return on_picture(tx, ty) && ends_before(x, y, tx, ty);
+}
+
+bool Effects::is_thin(int x, int y) const
+{
+    return (map_.near[map_.packet_of(uint32_t(x), uint32_t(y))] & kNearBorder) != 0 &&
+           is_thin_word(map_.border[map_.word_of(uint32_t(x), uint32_t(y))]);
+}
+
+/// As hides, or (tx, ty) is of a strip that lines at its border stand for.
+bool Effects::ends_before(int x, int y, int tx, int ty) const
+{
+    return hides(x, y, tx, ty) || is_thin(tx, ty);
+}
+
+/// Whether a hit's own line lies on that side of its middle.
+bool Effects::has_line_towards(int x, int y, int dx, int dy) const
+{
+    if ((map_.near[map_.packet_of(uint32_t(x), uint32_t(y))] & kNearLine) == 0)
+        return false;
+    const uint32_t word = map_.line[map_.word_of(uint32_t(x), uint32_t(y))];
+    if (word == 0)
+        return false;
+    const Offset line = offset_of(word);
+    return line.x * float(dx) + line.y * float(dy) > 0;
 }
 
 /// The line along the border at `offset` of (x, y): this pixel's share, and beyond an outline the other half.
@@ -332,7 +381,7 @@ void Effects::draw_line(BandMarks& band, int x, int y, Offset offset, int y0, in
     const size_t i = at(x, y);
     const float width = options_.edge_width_px, distance = offset.length();
     const auto raise = [&](int tx, int ty, float alpha) {
-        Mark* const m = mark(band, tx, ty, y0, y1);
+        Mark* const m = alpha > 0 ? mark(band, tx, ty, y0, y1) : nullptr;
         if (m && alpha > m->line) {
             m->line = alpha;
             m->line_from = static_cast<uint32_t>(i);
@@ -358,7 +407,9 @@ void Effects::draw_line(BandMarks& band, int x, int y, Offset offset, int y0, in
             const int tx = x + s * dx, ty = y + s * dy;
             if (!on_picture(tx, ty))
                 return;
-            if (!hidden && !hides(x, y, tx, ty)) {
+            if (!hidden && has_line_towards(tx, ty, -dx, -dy))
+                return; // the other face's half
+            if (!hidden && !ends_before(x, y, tx, ty)) {
                 if (past < 0)
                     continue;
                 return;
@@ -439,13 +490,30 @@ bool Effects::stands_for(Offset line, Offset border)
     return a < 1 && std::abs(line.x * border.x + line.y * border.y) > kAlong * a * b;
 }
 
+/// Asks the caches for what drawing a packet reads: the frame went past them to memory.
+void Effects::fetch_early(uint32_t column, uint32_t row) const
+{
+    const size_t packet = size_t{row} * map_.columns + column;
+    if (!map_.line.empty())
+        __builtin_prefetch(&map_.line[16 * packet]);
+    if (!map_.border.empty())
+        __builtin_prefetch(&map_.border[16 * packet]);
+    for (uint32_t y = 4 * row; y < std::min(4 * row + 4, frame_.height); ++y) {
+        const size_t i = at(int(4 * column), int(y));
+        __builtin_prefetch(&frame_.rgba[4 * i]);
+        __builtin_prefetch(&frame_.face[i]);
+        __builtin_prefetch(&frame_.instance[i]);
+        __builtin_prefetch(&frame_.depth_mm[i]);
+        __builtin_prefetch(&frame_.normal[3 * i]);
+    }
+}
+
 /// The pixels of a band whose colours change, in the order of their packets.
 std::vector<Painted> Effects::paint(uint32_t band_index) const
 {
     const int y0 = int(band_index * kBandRows), y1 = std::min(y0 + int(kBandRows), height_);
     BandMarks band;
-    band.marks.resize(size_t{16} * map_.columns * (kBandRows / 4));
-    band.is_dirty.assign(size_t{map_.columns} * (kBandRows / 4), 0);
+    band.place.assign(size_t{map_.columns} * (kBandRows / 4), kNone);
     // lines and covers reach into the band from beside it
     const int halo = int(line_reach(options_.edge_width_px) * 1.5f) + 2;
     const uint32_t first_row = uint32_t(std::max(y0 - halo, 0)) / 4,
@@ -453,6 +521,9 @@ std::vector<Painted> Effects::paint(uint32_t band_index) const
     for (uint32_t row = first_row; row <= last_row; ++row)
         for (uint32_t column = 0; column < map_.columns; ++column) {
             const size_t packet = size_t{row} * map_.columns + column;
+            constexpr uint32_t kAhead = 6; // packets: memory takes as long as so many are worked on
+            if (column + kAhead < map_.columns && map_.near[packet + kAhead] != 0)
+                fetch_early(column + kAhead, row);
             const uint8_t near = map_.near[packet];
             if (near == 0)
                 continue;
@@ -462,7 +533,7 @@ std::vector<Painted> Effects::paint(uint32_t band_index) const
                 const uint32_t line = (near & kNearLine) != 0 ? map_.line[16 * packet + i] : 0;
                 if (line != 0)
                     draw_line(band, x, y, offset_of(line), y0, y1);
-                if (border == 0)
+                if (border == 0 || is_thin_word(border))
                     continue;
                 const Offset offset = offset_of(border);
                 if (options_.silhouettes && !(line != 0 && stands_for(offset_of(line), offset)) &&
@@ -473,9 +544,11 @@ std::vector<Painted> Effects::paint(uint32_t band_index) const
             }
         }
     std::vector<Painted> painted;
-    for (const uint32_t packet : band.dirty)
+    painted.reserve(band.marks.size() / 2);
+    for (size_t place = 0; place < band.packets.size(); ++place)
         for (uint32_t i = 0; i < 16; ++i) {
-            const Mark& m = band.marks[16 * size_t{packet} + i];
+            const Mark& m = band.marks[16 * place + i];
+            const uint32_t packet = band.packets[place];
             if (m.cover_from == kNone && m.line_from == kNone)
                 continue;
             const int x = int(4 * (packet % map_.columns) + i % 4), y = y0 + int(4 * (packet / map_.columns) + i / 4);
