@@ -17,6 +17,7 @@
 #include "runtime/cpu_write.h"
 #include "shaders/shared/edge.h"
 #include "shaders/shared/torus.h"
+#include "shaders/shared/trim_lookup.h"
 
 #include <algorithm>
 #include <cstring>
@@ -288,6 +289,40 @@ private:
             measure_sides(face, box, asked, line, border);
         else
             measure_pieces(face_id, face, box, asked, line, border);
+        if (job_.trim == TrimMode::Sdf && face.sdf_size != 0) {
+            const real2 at = texture_border(face, asked);
+            const mask known = asked.here && in_texture(uv, texel_of(face));
+            move_to(at, known, line);
+            move_to(at, known, border);
+        }
+    }
+
+    static scalar2 texel_of(const FaceRecord& face)
+    {
+        return scalar2(1 / float(face.sdf_size & 0xffffu), 1 / float(face.sdf_size >> 16));
+    }
+
+    /// Where the texture that trims the face has its border.
+    HWY_ATTR HWY_NOINLINE real2 texture_border(const FaceRecord& face, const Asked& asked) const
+    {
+        const FetchSource& source = source_;
+        const TrimFace trim = trim_face(face);
+        const auto clamped = [](real x) HWY_ATTR { return clamp(x, real(0.0f), real(kUvBelowOne)); };
+        const auto distance_at = [&](real u, real v)
+                                     HWY_ATTR { return sdf_distance(FETCH_PASS trim, real2(clamped(u), clamped(v))); };
+        const float du = 0.5f * texel_of(face).x, dv = 0.5f * texel_of(face).y;
+        const real2 uv = asked.uv;
+        const real2 gradient((distance_at(uv.x + du, uv.y) - distance_at(uv.x - du, uv.y)) * (0.5f / du),
+                             (distance_at(uv.x, uv.y + dv) - distance_at(uv.x, uv.y - dv)) * (0.5f / dv));
+        return level_offset(asked.map, distance_at(uv.x, uv.y), gradient);
+    }
+
+    /// Moves what a piece said to where the texture has it.
+    HWY_ATTR static void move_to(real2 offset, mask here, Nearest& nearest)
+    {
+        const mask known = here && nearest.square < kHuge && agrees(offset, nearest.offset);
+        nearest.offset = select(known, offset, nearest.offset);
+        nearest.square = select(known, dot(offset, offset), nearest.square);
     }
 
     HWY_ATTR static mask lanes_of(uint bits)

@@ -181,6 +181,30 @@ void measure_sides(Measured m, float reach, FaceRecord face, vec2 box_lo, vec2 b
     }
 }
 
+float texture_distance(TrimFace trim, vec2 uv)
+{
+    return sdf_distance(trim, clamp(uv, vec2(0.0f), vec2(kUvBelowOne)));
+}
+
+// Where the texture that trims the face has its border
+vec2 texture_border(TrimFace trim, Measured m)
+{
+    vec2 half_texel = vec2(0.5f) / vec2(float(trim.sdf_width), float(trim.sdf_height));
+    vec2 du = vec2(half_texel.x, 0.0f);
+    vec2 dv = vec2(0.0f, half_texel.y);
+    vec2 gradient = vec2(texture_distance(trim, m.uv + du) - texture_distance(trim, m.uv - du),
+                         texture_distance(trim, m.uv + dv) - texture_distance(trim, m.uv - dv)) *
+                    0.5f / half_texel;
+    return level_offset(m.map, texture_distance(trim, m.uv), gradient);
+}
+
+// Moves what a piece said to where the texture has it.
+void move_to(vec2 offset, inout NearestBorder nearest)
+{
+    if (nearest.square < kHuge && agrees(offset, nearest.offset))
+        nearest = NearestBorder(offset, dot(offset, offset), nearest.strength);
+}
+
 uint word_within(NearestBorder nearest, float reach)
 {
     return nearest.square <= reach * reach ? edge_word(nearest.offset, nearest.strength) : 0u;
@@ -202,5 +226,12 @@ uvec2 find_edges(Hit hit, vec2 pixel)
         measure_sides(m, reach, face, box_lo, box_hi);
     else
         measure_pieces(m, reach, patch.face, face, box_lo, box_hi);
+    TrimFace trim = trim_face(face);
+    if (trim_mode == kTrimByTexture && trim.sdf_width > 0u &&
+        in_texture(m.uv, 1.0f / vec2(float(trim.sdf_width), float(trim.sdf_height)))) {
+        vec2 at = texture_border(trim, m);
+        move_to(at, nearest_line);
+        move_to(at, nearest_border);
+    }
     return uvec2(word_within(nearest_line, view.line_reach_px), word_within(nearest_border, view.border_reach_px));
 }

@@ -1,5 +1,6 @@
 // The shared formulas, in lanes, against long double.
 #include "runtime/cpu_evaluate.h"
+#include "shaders/shared/edge.h"
 #include "shaders/shared/language.h"
 #include "shaders/shared/precision.h"
 #include "shaders/shared/quadric.h"
@@ -243,6 +244,145 @@ TEST(formulas, patches_of_small_degree_give_the_bits_of_the_general_formula)
         }
     }
     EXPECT_EQ(fixed, 12);
+}
+
+// A native surface as pack_layout.h has it, in double.
+struct NativeSurface {
+    uint kind;
+    double r, second; // param
+    void at(double u, double v, double (&p)[3]) const
+    {
+        const double sin_a = second / std::sqrt(1 + second * second), cos_a = 1 / std::sqrt(1 + second * second);
+        const double rho = kind == kKindCylinder ? r
+                           : kind == kKindCone   ? r + v * sin_a
+                           : kind == kKindSphere ? r * std::cos(v)
+                                                 : r + second * std::cos(v);
+        p[0] = rho * std::cos(u);
+        p[1] = rho * std::sin(u);
+        p[2] = kind == kKindCylinder ? v
+               : kind == kKindCone   ? v * cos_a
+               : kind == kKindSphere ? r * std::sin(v)
+                                     : second * std::sin(v);
+    }
+    Derivatives derivatives(real3 p) const
+    {
+        const scalar a = scalar(r), b = scalar(second);
+        return kind == kKindCylinder ? cylinder_derivatives(p)
+               : kind == kKindCone   ? cone_derivatives(a, b, p)
+               : kind == kKindSphere ? sphere_derivatives(p)
+                                     : torus_derivatives(a, torus_side(a, b, p), p);
+    }
+};
+
+const NativeSurface kNativeSurfaces[] = {
+    {kKindCylinder, 0.7, 0}, {kKindCone, 0.5, -0.4}, {kKindSphere, 0.8, 0}, {kKindTorus, 0.6, 0.3}};
+
+TEST(formulas, derivatives_of_native_surfaces_are_the_limits_of_differences)
+{
+    std::mt19937 random(12);
+    std::uniform_real_distribution<double> any(-1, 1);
+    for (const NativeSurface& surface : kNativeSurfaces) {
+        for (int k = 0; k < 200; ++k) {
+            const double u = 3 * any(random), v = any(random), h = 1e-4;
+            double s[3][3][3]; // at u + (i - 1) h, v + (j - 1) h
+            for (int i = 0; i < 3; ++i)
+                for (int j = 0; j < 3; ++j)
+                    surface.at(u + (i - 1) * h, v + (j - 1) * h, s[i][j]);
+            const real3 p = scalar3(float(s[1][1][0]), float(s[1][1][1]), float(s[1][1][2]));
+            const Derivatives d = surface.derivatives(p);
+            const auto lane = [](real3 a, int c) { return double(values(c == 0 ? a.x : c == 1 ? a.y : a.z).at[3]); };
+            for (int c = 0; c < 3; ++c) {
+                EXPECT_NEAR(lane(d.u, c), (s[2][1][c] - s[0][1][c]) / (2 * h), 1e-6);
+                EXPECT_NEAR(lane(d.v, c), (s[1][2][c] - s[1][0][c]) / (2 * h), 1e-6);
+                EXPECT_NEAR(lane(d.uu, c), (s[2][1][c] - 2 * s[1][1][c] + s[0][1][c]) / (h * h), 2e-6);
+                EXPECT_NEAR(lane(d.vv, c), (s[1][2][c] - 2 * s[1][1][c] + s[1][0][c]) / (h * h), 2e-6);
+                EXPECT_NEAR(lane(d.uv, c), (s[2][2][c] - s[2][0][c] - s[0][2][c] + s[0][0][c]) / (4 * h * h), 2e-6);
+            }
+        }
+    }
+}
+
+TEST(formulas, the_map_to_pixels_says_where_points_nearby_are_seen)
+{
+    // an eye 5 away, 1e-3 a pixel, the axes of the picture askew
+    const double eye[3] = {0.3, -0.2, 5}, w0[3] = {-0.05, 0.02, -1}, step_x[3] = {1e-3, 2e-4, 0},
+                 step_y[3] = {-1e-4, 1.1e-3, 5e-5};
+    const auto pixel_of = [&](const double(&p)[3], double(&at)[2], double& T) {
+        // p - eye = T w0 + (T x) step_x + (T y) step_y, by Cramer's rule
+        const double q[3] = {p[0] - eye[0], p[1] - eye[1], p[2] - eye[2]};
+        const auto det = [](const double(&a)[3], const double(&b)[3], const double(&c)[3]) {
+            return a[0] * (b[1] * c[2] - b[2] * c[1]) - a[1] * (b[0] * c[2] - b[2] * c[0]) +
+                   a[2] * (b[0] * c[1] - b[1] * c[0]);
+        };
+        const double whole = det(w0, step_x, step_y);
+        T = det(q, step_x, step_y) / whole;
+        at[0] = det(w0, q, step_y) / whole / T;
+        at[1] = det(w0, step_x, q) / whole / T;
+    };
+    std::mt19937 random(13);
+    std::uniform_real_distribution<double> any(-1, 1);
+    double worst_first = 0, worst_second = 0;
+    for (const NativeSurface& surface : kNativeSurfaces) {
+        for (int k = 0; k < 300; ++k) {
+            const double u = 3 * any(random), v = any(random), du = 0.02 * any(random), dv = 0.02 * any(random);
+            double p[3], near[3], there[3], at[2], at_near[2], at_there[2], T, other;
+            surface.at(u, v, p);
+            surface.at(u + 1e-3 * du, v + 1e-3 * dv, near);
+            surface.at(u + du, v + dv, there);
+            pixel_of(p, at, T);
+            pixel_of(near, at_near, other);
+            pixel_of(there, at_there, other);
+            const auto lanes = [](const double(&a)[3]) { return scalar3(float(a[0]), float(a[1]), float(a[2])); };
+            const real3 w = real3(lanes(w0)) + real(float(at[0])) * real3(lanes(step_x)) +
+                            real(float(at[1])) * real3(lanes(step_y));
+            const PixelRows rows = pixel_rows(w, lanes(step_x), lanes(step_y), real(float(T)));
+            const Derivatives d = surface.derivatives(real3(lanes(p)));
+            const scalar2 uv_scale(0.25f, 2.0f); // uv_face a unit of uv_patch
+            const PixelMap map = pixel_map(rows, d.u, d.v, uv_scale);
+            const real2 first = to_pixels(map, real2(scalar2(float(1e-3 * du * 0.25), float(1e-3 * dv * 2))));
+            const real2 second = seen_bent(rows, map, d, real2(scalar2(float(du), float(dv))));
+            worst_first = std::max({worst_first, std::abs(double(values(first.x).at[0]) - (at_near[0] - at[0])),
+                                    std::abs(double(values(first.y).at[0]) - (at_near[1] - at[1]))});
+            if (values(second.x).at[0] > 1e3f)
+                continue; // turned away on the way
+            worst_second = std::max({worst_second, std::abs(double(values(second.x).at[0]) - (at_there[0] - at[0])),
+                                     std::abs(double(values(second.y).at[0]) - (at_there[1] - at[1]))});
+        }
+    }
+    EXPECT_LT(worst_first, 1e-4);  // pixels, of steps of 0.004
+    EXPECT_LT(worst_second, 0.04); // pixels, of steps of 4: perspective's own bend is left out
+}
+
+TEST(formulas, the_nearest_point_of_a_piece_is_the_nearest)
+{
+    // monotone cubics of some 40 pixels, seen from beside them
+    std::mt19937 random(14);
+    std::uniform_real_distribution<float> unit(0, 1);
+    double worst = 0;
+    int asked = 0;
+    for (int k = 0; k < 2000; ++k) {
+        float x[4] = {0, 10 + 10 * unit(random), 20 + 10 * unit(random), 40};
+        float y[4] = {0, 15 * unit(random), 15 + 10 * unit(random), 30};
+        const auto point = [&](double t, const float(&c)[4]) {
+            const double s = 1 - t;
+            return s * s * s * c[0] + 3 * s * s * t * c[1] + 3 * s * t * t * c[2] + t * t * t * c[3];
+        };
+        const double t = unit(random);
+        const float at_x = float(point(t, x)) + 3 * unit(random) - 1.5f, at_y = float(point(t, y)) + unit(random);
+        for (int i = 0; i < 4; ++i) {
+            x[i] -= at_x;
+            y[i] -= at_y;
+        }
+        double least = 1e30;
+        for (int i = 0; i <= 4000; ++i)
+            least = std::min(least, std::hypot(point(i / 4000.0, x), point(i / 4000.0, y)));
+        const real2 a(scalar2(x[0], y[0])), b(scalar2(x[1], y[1])), c(scalar2(x[2], y[2])), d(scalar2(x[3], y[3]));
+        const real2 nearest = cubic_at(a, b, c, d, nearest_on_cubic(a, b, c, d)).p;
+        worst = std::max(worst, double(values(length(nearest)).at[5]) - least);
+        ++asked;
+    }
+    EXPECT_EQ(asked, 2000);
+    EXPECT_LT(worst, 0.01); // pixels
 }
 
 TEST(formulas, pairs_of_floats_keep_46_bits)

@@ -115,6 +115,25 @@ TEST(frame_effects, a_curved_trim_is_as_wide_at_every_slant)
     }
 }
 
+TEST(frame_effects, the_border_of_a_texture_is_as_wide_at_every_slant)
+{
+    for (const double slant : {0.0, 30.0, 60.0, 75.0, 85.0}) {
+        TracedScene model;
+        model.add(kKindPlane, 1, {0, 0, 0}, {0.9, 0.9});
+        model.trim(0,
+                   {shapes::polygon({{0, 0}, {1, 0}, {1, 1}, {0, 1}}), shapes::circle(0.5, 0.5, 0.3, 0.3)}); // 5.4 mm
+        for (uint i = 0; i < 4; ++i)
+            model.image.trim_pieces[i] |= kEdgeSeam << kPieceClassShift; // the hole's alone is an edge
+        model.place(slanted(slant, 17));
+        RenderOptions options = lines_only(plan_view());
+        options.trim = TrimMode::Sdf;
+        const Drawn drawn = draw(model.finish(), options);
+        EXPECT_EQ(drawn.stats.trim, TrimMode::Sdf);
+        const double length = ellipse(5.4, 5.4 * std::cos(slant * kRadians)) * kPixelsPerMm;
+        EXPECT_NEAR(ink(drawn.frame) / length, double(options.edge_width_px), 0.09) << slant;
+    }
+}
+
 TEST(frame_effects, each_face_draws_its_half_of_a_crease)
 {
     TracedScene model; // a ridge along y at x = 0

@@ -204,6 +204,36 @@ FN_LARGE real nearest_on_cubic(real2 a, real2 b, real2 c, real2 d)
     return t;
 }
 
+// ---- the border of a distance texture ------------------------------------------------------------------------------
+// Eq. 6: where a signed distance d is 0, to the first order: against its gradient g = grad d in pixels, at
+// -d g / |g|^2. `by_uv` is the gradient by uv_face; in pixels it is A^-T by_uv. kHuge away where the distance is level.
+FN real2 level_offset(PixelMap map, real d, real2 by_uv)
+{
+    real det = map.du.x * map.dv.y - map.du.y * map.dv.x;
+    real gx = map.dv.y * by_uv.x - map.du.y * by_uv.y; // times det
+    real gy = map.du.x * by_uv.y - map.dv.x * by_uv.x;
+    real square = gx * gx + gy * gy;
+    mask slopes = square > 1e-30f;
+    real scale = -d * det / select(slopes, square, real(1.0f));
+    return real2(select(slopes, gx * scale, real(kHuge)), select(slopes, gy * scale, real(kHuge)));
+}
+
+// The pieces know what kind of edge is near, the texture where the face that it trims ends. They differ by the
+// texture's error; where by more pixels than this, the texture has no such border (at the domain's, nor of what is
+// below a texel), and the piece stays.
+const scalar kTextureAgrees = 2.0f;
+FN mask agrees(real2 of_texture, real2 of_piece)
+{
+    real2 apart = of_texture - of_piece;
+    return dot(apart, apart) <= kTextureAgrees * kTextureAgrees;
+}
+
+// Within a texel of the domain's border a texture goes on as it is, and has no border there.
+FN mask in_texture(real2 uv, scalar2 texel)
+{
+    return abs(uv.x - 0.5f) < 0.5f - texel.x && abs(uv.y - 0.5f) < 0.5f - texel.y;
+}
+
 // ---- what a pixel keeps of it --------------------------------------------------------------------------------------
 // One word: the offset to the nearest border, x | y << 14, each (pixels + 32) * 256, and a strength << 28, 1 to 15; 0:
 // none is near.
