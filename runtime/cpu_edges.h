@@ -214,6 +214,7 @@ private:
         Derivatives native; // of native kinds
         real3 p;            // the hits in patch space, of Bezier patches
         real line_strength;
+        real2 reach; // in uv_face: nothing farther counts
     };
 
     HWY_ATTR SurfacePoint bezier_at(const PatchRecord& patch, real2 uv_face) const
@@ -256,8 +257,9 @@ private:
         const real3 w = w0 + across;
         const real t = (hit.best - view.base_mm) * (1 / view.mm_per_t);
         const real3 p = middle + across * real(view.tau) + w * t;
-        Asked asked{patch, lanes_of(lanes), lanes, hit.uv_face, pixel_rows(w, step_x, step_y, t + view.tau), {}, {},
-                    p,     real(1.0f)};
+        Asked asked{
+            patch, lanes_of(lanes), lanes,      hit.uv_face, pixel_rows(w, step_x, step_y, t + view.tau), {}, {},
+            p,     real(1.0f),      hit.uv_face};
         const scalar2 uv_scale(patch.uv_scale[0], patch.uv_scale[1]);
         if (is_bezier(patch)) {
             const SurfacePoint s = bezier_at(patch, hit.uv_face);
@@ -277,18 +279,25 @@ private:
     {
         const uint face_id = face_of(leaf);
         const FaceRecord& face = image_.faces[face_id];
-        const Asked asked = asked_of(packet, hit, leaf, instance, lanes);
-        const real2 reach = reach_in_uv(asked.map, job_.edges->query.reach_px());
+        Asked asked = asked_of(packet, hit, leaf, instance, lanes);
+        const Grid grid = grid_of(face_id);
+        const bool natural = (face.flags & kFaceNaturalBorder) != 0;
+        if (!natural && grid.columns == 0)
+            return;
+        real2 reach = reach_in_uv(asked.map, job_.edges->query.reach_px());
+        if (!natural)
+            reach = reach_in_cells(reach, scalar(grid.columns), scalar(grid.rows));
+        asked.reach = reach;
         const real2 uv = hit.uv_face;
         const real none(-kHuge);
         const UvBox box{-largest_lane(select(asked.here, reach.x - uv.x, none)),
                         largest_lane(select(asked.here, uv.x + reach.x, none)),
                         -largest_lane(select(asked.here, reach.y - uv.y, none)),
                         largest_lane(select(asked.here, uv.y + reach.y, none))};
-        if ((face.flags & kFaceNaturalBorder) != 0)
+        if (natural)
             measure_sides(face, box, asked, line, border);
         else
-            measure_pieces(face_id, face, box, asked, line, border);
+            measure_pieces(grid, face, box, asked, line, border);
         if (job_.trim == TrimMode::Sdf && face.sdf_size != 0) {
             const real2 at = texture_border(face, asked);
             const mask known = asked.here && in_texture(uv, texel_of(face));
@@ -364,16 +373,11 @@ private:
         offer_border(asked, edge_class, cubic_at(a, b, c, d, t).p, line, border);
     }
 
-    HWY_ATTR void measure_pieces(uint face_id, const FaceRecord& face, const UvBox& box, const Asked& asked,
+    HWY_ATTR void measure_pieces(const Grid& grid, const FaceRecord& face, const UvBox& box, const Asked& asked,
                                  Nearest& line, Nearest& border)
     {
-        const Grid grid = grid_of(face_id);
-        if (grid.columns == 0)
-            return;
-        uint i0 = index_of(box.u0, grid.columns), i1 = index_of(box.u1, grid.columns);
-        uint j0 = index_of(box.v0, grid.rows), j1 = index_of(box.v1, grid.rows);
-        keep_middle(i0, i1);
-        keep_middle(j0, j1);
+        const uint i0 = index_of(box.u0, grid.columns), i1 = index_of(box.u1, grid.columns);
+        const uint j0 = index_of(box.v0, grid.rows), j1 = index_of(box.v1, grid.rows);
         const uint* words = job_.edges->cells.words.data();
         uint done[kMostPieces], done_count = 0;
         for (uint j = j0; j <= j1; ++j) {
@@ -399,16 +403,6 @@ private:
         }
     }
 
-    /// Where a face is so far away that a packet covers more cells than this, its middle ones are looked at.
-    static void keep_middle(uint& lo, uint& hi)
-    {
-        constexpr uint kMostCells = 8;
-        if (hi - lo >= kMostCells) {
-            lo = (lo + hi - kMostCells) / 2;
-            hi = lo + kMostCells - 1;
-        }
-    }
-
     /// A piece is monotone: it lies in its ends' box.
     static bool outside(const UvBox& box, const float* p, uint last)
     {
@@ -428,7 +422,8 @@ private:
         const real2 step = uv_face - asked.uv;
         real2 offset = to_pixels(asked.map, step);
         const float reach = query.reach_px();
-        if (!any_lane(asked.here && dot(offset, offset) <= reach * reach))
+        const mask here = asked.here && abs(step.x) <= asked.reach.x && abs(step.y) <= asked.reach.y;
+        if (!any_lane(here && dot(offset, offset) <= reach * reach))
             return;
         if (is_bezier(asked.patch)) {
             const SurfacePoint there = bezier_at(asked.patch, uv_face);
@@ -439,13 +434,13 @@ private:
         }
         const real square = dot(offset, offset);
         if (as_line) {
-            const mask nearer = asked.here && square < line.square;
+            const mask nearer = here && square < line.square;
             line.offset = select(nearer, offset, line.offset);
             line.square = select(nearer, square, line.square);
             line.strength = select(nearer, asked.line_strength, line.strength);
         }
         if (as_border) {
-            const mask nearer = asked.here && square < border.square;
+            const mask nearer = here && square < border.square;
             border.offset = select(nearer, offset, border.offset);
             border.square = select(nearer, square, border.square);
         }

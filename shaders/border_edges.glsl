@@ -21,6 +21,7 @@ struct Measured {
     Derivatives native; // of native kinds
     vec3 p;             // the hit in patch space, of Bezier patches
     float line_strength;
+    vec2 reach_uv; // nothing farther counts
 };
 
 NearestBorder nearest_line;
@@ -85,7 +86,7 @@ void offer_border(Measured m, float reach, uint edge_class, vec2 uv_face)
     bool as_border = view.border_reach_px > 0.0f;
     vec2 step = uv_face - m.uv;
     vec2 offset = to_pixels(m.map, step);
-    if (!(as_line || as_border) || dot(offset, offset) > reach * reach)
+    if (!(as_line || as_border) || dot(offset, offset) > reach * reach || any(greaterThan(abs(step), m.reach_uv)))
         return;
     if (m.kind == kKindBezier && has_kind(kKindBezier)) {
         SurfacePoint there = bezier_at(m.patch, uv_face);
@@ -129,28 +130,24 @@ void measure_piece(Measured m, float reach, FaceRecord face, uint word, vec2 box
     offer_border(m, reach, edge_class, cubic_at(a, b, c, d, t).p);
 }
 
-// First and last cell of a box in one direction; where a face is so far away that there are many, the middle ones
-uvec2 cells_between(float lo, float hi, uint count)
+uint cell_of(float x, uint count)
 {
-    const uint kMostCells = 8u;
-    uint first = min(uint(clamp(lo, 0.0f, 1.0f) * float(count)), count - 1u);
-    uint last = min(uint(clamp(hi, 0.0f, 1.0f) * float(count)), count - 1u);
-    if (last - first >= kMostCells) {
-        first = (first + last - kMostCells) / 2u;
-        last = first + kMostCells - 1u;
-    }
-    return uvec2(first, last);
+    return min(uint(clamp(x, 0.0f, 1.0f) * float(count)), count - 1u);
 }
 
-void measure_pieces(Measured m, float reach, uint face_index, FaceRecord face, vec2 box_lo, vec2 box_hi)
+void measure_pieces(Measured m, float reach, uint face_index, FaceRecord face)
 {
     uint size = border_words[2u * face_index];
     uint columns = size & 0xffffu;
+    uint rows = size >> 16;
     if (columns == 0u)
         return;
+    m.reach_uv = reach_in_cells(m.reach_uv, float(columns), float(rows));
+    vec2 box_lo = m.uv - m.reach_uv;
+    vec2 box_hi = m.uv + m.reach_uv;
     uint cells = border_words[2u * face_index + 1u];
-    uvec2 i = cells_between(box_lo.x, box_hi.x, columns);
-    uvec2 j = cells_between(box_lo.y, box_hi.y, size >> 16);
+    uvec2 i = uvec2(cell_of(box_lo.x, columns), cell_of(box_hi.x, columns));
+    uvec2 j = uvec2(cell_of(box_lo.y, rows), cell_of(box_hi.y, rows));
     iterations = 0u;
     for (uint row = j.x; row <= j.y; ++row) {
         uint at = border_words[cells + row * columns + i.x];
@@ -219,13 +216,11 @@ uvec2 find_edges(Hit hit, vec2 pixel)
     nearest_border = nearest_line;
     Measured m = measured_hit(hit, instances[hit.instance], patch, pixel);
     float reach = max(view.line_reach_px, view.border_reach_px);
-    vec2 around = reach_in_uv(m.map, reach);
-    vec2 box_lo = m.uv - around;
-    vec2 box_hi = m.uv + around;
+    m.reach_uv = reach_in_uv(m.map, reach);
     if ((face.flags & kFaceNaturalBorder) != 0u)
-        measure_sides(m, reach, face, box_lo, box_hi);
+        measure_sides(m, reach, face, m.uv - m.reach_uv, m.uv + m.reach_uv);
     else
-        measure_pieces(m, reach, patch.face, face, box_lo, box_hi);
+        measure_pieces(m, reach, patch.face, face);
     TrimFace trim = trim_face(face);
     if (trim_mode == kTrimByTexture && trim.sdf_width > 0u &&
         in_texture(m.uv, 1.0f / vec2(float(trim.sdf_width), float(trim.sdf_height)))) {

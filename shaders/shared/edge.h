@@ -153,6 +153,14 @@ FN real2 reach_in_uv(PixelMap map, scalar radius)
     return real2(min(u, real(kHuge)), min(v, real(kHuge)));
 }
 
+// Borders are looked for so many cells (of columns x rows) around a hit at most: where a face is seen edge-on, all of
+// it is within a pixel.
+const scalar kMostCellsAround = 4.0f;
+FN real2 reach_in_cells(real2 reach, scalar columns, scalar rows)
+{
+    return real2(min(reach.x, real(kMostCellsAround / columns)), min(reach.y, real(kMostCellsAround / rows)));
+}
+
 // How wide the face's whole domain is seen across its thinner direction, pixels
 FN real seen_thickness(PixelMap map)
 {
