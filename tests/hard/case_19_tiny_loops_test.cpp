@@ -26,7 +26,7 @@ TEST(case_19, holes_from_4_texels_to_a_hundredth_are_whole_where_pieces_are_aske
         const double radius = radius_texels * texel;
         const TrimmedPlane plane = trimmed_plane({kRim, shapes::circle(0.503, 0.511, radius, radius)});
         ASSERT_NEAR(texel_uv(plane), texel, 0.2 * texel);
-        const PlaneView view{0.503, 0.511, 3 * radius, 160};
+        const PlaneView view{0.503, 0.511, 3 * radius, 100};
         const double pixel_texels = view.size / view.pixels / texel_uv(plane);
         const double hole = std::numbers::pi / 9 * view.pixels * view.pixels; // pixels
         const int tested = in_every_trim_mode(plane, {view}, [&](const TrimWay& way, size_t, const TrimErrors& errors) {
@@ -55,7 +55,7 @@ TEST(case_19, slivers_below_a_texel_are_whole_where_pieces_are_asked)
     const TrimmedPlane plane =
         trimmed_plane({kRim, shapes::polygon({{0.1f, 0.3f}, {0.9f, 0.31f}, {0.9f, 0.3101f}}),
                        shapes::polygon({{0.2f, 0.5f}, {0.8f, 0.5f}, {0.8f, 0.5005f}, {0.2f, 0.5005f}})});
-    const std::vector<PlaneView> views{{}, {0.9, 0.31, 0.001, 160}, {0.2, 0.5, 0.002, 160}};
+    const std::vector<PlaneView> views{{}, {0.9, 0.31, 0.001, 100}, {0.2, 0.5, 0.002, 100}};
     const int tested = in_every_trim_mode(plane, views, [&](const TrimWay& way, size_t i, const TrimErrors& errors) {
         if (way.exact()) {
             EXPECT_LE(errors.farthest_px, 0.01 + kRounding_uv / views[i].size * views[i].pixels) << way.name;

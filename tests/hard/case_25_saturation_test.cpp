@@ -88,7 +88,7 @@ TEST(case_25, tracers_read_their_own_texture_and_nothing_beside_it)
         image.sdf_words.insert(image.sdf_words.begin(), 100, 0xa53c5ac3u);
         image.sdf_words.insert(image.sdf_words.end(), 100, 0x5ac3a53cu);
         image.faces[0].sdf_first_word += 100;
-        const PlaneView view{0.5, 0.5, 0.999, 300};
+        const PlaneView view{0.5, 0.5, 0.999, 200};
         const int tested = in_every_trim_mode(plane, {view}, [&](const TrimWay& way, size_t, const TrimErrors& errors) {
             if (way.mode != TrimMode::Sdf)
                 return;
