@@ -45,7 +45,7 @@ TEST(case_17, all_orientations_of_nested_loops_give_one_picture_in_every_mode)
             }
             pictures.push_back(errors.picture);
         });
-        EXPECT_GE(tested, 2);
+        EXPECT_GE(tested, 4); // the CPU tracer has every way
         if (turned == 0)
             first = pictures;
         EXPECT_EQ(pictures, first) << "orientations " << turned;
