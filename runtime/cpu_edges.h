@@ -308,17 +308,18 @@ private:
 
     static scalar2 texel_of(const FaceRecord& face)
     {
-        return scalar2(1 / float(face.sdf_size & 0xffffu), 1 / float(face.sdf_size >> 16));
+        const SdfFace sdf = sdf_face(face);
+        return scalar2(1 / sdf.scale.x, 1 / sdf.scale.y);
     }
 
     /// Where the texture that trims the face has its border.
     HWY_ATTR HWY_NOINLINE real2 texture_border(const FaceRecord& face, const Asked& asked) const
     {
         const FetchSource& source = source_;
-        const TrimFace trim = trim_face(face);
+        const SdfFace sdf = sdf_face(face);
         const auto clamped = [](real x) HWY_ATTR { return clamp(x, real(0.0f), real(kUvBelowOne)); };
         const auto distance_at = [&](real u, real v)
-                                     HWY_ATTR { return sdf_distance(FETCH_PASS trim, real2(clamped(u), clamped(v))); };
+                                     HWY_ATTR { return sdf_distance(FETCH_PASS sdf, real2(clamped(u), clamped(v))); };
         const float du = 0.5f * texel_of(face).x, dv = 0.5f * texel_of(face).y;
         const real2 uv = asked.uv;
         const real2 gradient((distance_at(uv.x + du, uv.y) - distance_at(uv.x - du, uv.y)) * (0.5f / du),

@@ -178,21 +178,21 @@ void measure_sides(Measured m, float reach, FaceRecord face, vec2 box_lo, vec2 b
     }
 }
 
-float texture_distance(TrimFace trim, vec2 uv)
+float texture_distance(SdfFace sdf, vec2 uv)
 {
-    return sdf_distance(trim, clamp(uv, vec2(0.0f), vec2(kUvBelowOne)));
+    return sdf_distance(sdf, clamp(uv, vec2(0.0f), vec2(kUvBelowOne)));
 }
 
 // Where the texture that trims the face has its border
-vec2 texture_border(TrimFace trim, Measured m)
+vec2 texture_border(SdfFace sdf, Measured m)
 {
-    vec2 half_texel = vec2(0.5f) / vec2(float(trim.sdf_width), float(trim.sdf_height));
+    vec2 half_texel = 0.5f / sdf.scale;
     vec2 du = vec2(half_texel.x, 0.0f);
     vec2 dv = vec2(0.0f, half_texel.y);
-    vec2 gradient = vec2(texture_distance(trim, m.uv + du) - texture_distance(trim, m.uv - du),
-                         texture_distance(trim, m.uv + dv) - texture_distance(trim, m.uv - dv)) *
+    vec2 gradient = vec2(texture_distance(sdf, m.uv + du) - texture_distance(sdf, m.uv - du),
+                         texture_distance(sdf, m.uv + dv) - texture_distance(sdf, m.uv - dv)) *
                     0.5f / half_texel;
-    return level_offset(m.map, texture_distance(trim, m.uv), gradient);
+    return level_offset(m.map, texture_distance(sdf, m.uv), gradient);
 }
 
 // Moves what a piece said to where the texture has it.
@@ -221,12 +221,13 @@ uvec2 find_edges(Hit hit, vec2 pixel)
         measure_sides(m, reach, face, m.uv - m.reach_uv, m.uv + m.reach_uv);
     else
         measure_pieces(m, reach, patch.face, face);
-    TrimFace trim = trim_face(face);
-    if (trim_mode == kTrimByTexture && trim.sdf_width > 0u &&
-        in_texture(m.uv, 1.0f / vec2(float(trim.sdf_width), float(trim.sdf_height)))) {
-        vec2 at = texture_border(trim, m);
-        move_to(at, nearest_line);
-        move_to(at, nearest_border);
+    if (trim_mode == kTrimByTexture && face.sdf_size != 0u) {
+        SdfFace sdf = sdf_face(face);
+        if (in_texture(m.uv, 1.0f / sdf.scale)) {
+            vec2 at = texture_border(sdf, m);
+            move_to(at, nearest_line);
+            move_to(at, nearest_border);
+        }
     }
     return uvec2(word_within(nearest_line, view.line_reach_px), word_within(nearest_border, view.border_reach_px));
 }
