@@ -224,7 +224,8 @@ TEST(formulas, patches_of_small_degree_give_the_bits_of_the_general_formula)
                     if (rational)
                         points.push_back(w);
                 }
-                const FetchSource source{points.data(), nullptr, nullptr, nullptr, nullptr};
+                FetchSource source{};
+                source.control_points = points.data();
                 for (int n = 0; n < 200; ++n) {
                     Lanes u, v;
                     for (int i = 0; i < kLanes; ++i) {
