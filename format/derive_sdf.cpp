@@ -12,6 +12,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <tuple>
 
 namespace trimray {
 namespace {
@@ -28,12 +29,26 @@ bool has_texture(const FaceRecord& face)
     return face.piece_count != 0 && (face.sdf_size & 0xffffu) != 0 && (face.sdf_size >> 16) != 0;
 }
 
+/// The pieces of a face, each from its lower end, in an order of their own: which way the file's loops run and where
+/// they begin must not show in a texture's rounding.
 std::vector<MonotonePiece> pieces_of(const PackImage& image, const FaceRecord& face)
 {
     std::vector<MonotonePiece> pieces;
-    for (uint i = 0; i < face.piece_count; ++i)
-        pieces.push_back(
-            load_piece(image.trim_points.data(), face.first_point, image.trim_pieces[face.first_piece + i]));
+    for (uint i = 0; i < face.piece_count; ++i) {
+        MonotonePiece piece =
+            load_piece(image.trim_points.data(), face.first_point, image.trim_pieces[face.first_piece + i]);
+        if (std::tie(piece.v[3], piece.u[3]) < std::tie(piece.v[0], piece.u[0])) {
+            std::reverse(std::begin(piece.u), std::end(piece.u));
+            std::reverse(std::begin(piece.v), std::end(piece.v));
+            if (!piece.cubic)
+                set_thirds(piece);
+        }
+        pieces.push_back(piece);
+    }
+    std::sort(pieces.begin(), pieces.end(), [](const MonotonePiece& a, const MonotonePiece& b) {
+        return std::tie(a.v[0], a.u[0], a.v[3], a.u[3], a.v[1], a.u[1], a.v[2], a.u[2]) <
+               std::tie(b.v[0], b.u[0], b.v[3], b.u[3], b.v[1], b.u[1], b.v[2], b.u[2]);
+    });
     return pieces;
 }
 

@@ -22,6 +22,15 @@ struct MonotonePiece {
     bool u_grows_with_v() const { return (u[3] > u[0]) == (v[3] > v[0]); }
 };
 
+/// Puts a line's inner points at its thirds.
+inline void set_thirds(MonotonePiece& line)
+{
+    for (const int i : {1, 2}) {
+        line.u[i] = line.u[0] + i / 3.0 * (line.u[3] - line.u[0]);
+        line.v[i] = line.v[0] + i / 3.0 * (line.v[3] - line.v[0]);
+    }
+}
+
 /// The piece that `word` of `face` stands for. Domain: a validated image.
 inline MonotonePiece load_piece(const float* points, uint first_point, uint word)
 {
@@ -35,11 +44,8 @@ inline MonotonePiece load_piece(const float* points, uint first_point, uint word
         }
         return piece;
     }
-    for (int i = 0; i < 4; ++i) {
-        const double t = i / 3.0;
-        piece.u[i] = i == 3 ? p[2] : p[0] + t * (static_cast<double>(p[2]) - p[0]);
-        piece.v[i] = i == 3 ? p[3] : p[1] + t * (static_cast<double>(p[3]) - p[1]);
-    }
+    piece.u[0] = p[0], piece.v[0] = p[1], piece.u[3] = p[2], piece.v[3] = p[3];
+    set_thirds(piece);
     return piece;
 }
 
