@@ -89,6 +89,11 @@ def shown(db):
     return "equal" if db >= EQUAL_DB else f"{db:.1f}"
 
 
+def wrong_rays(rows):
+    value = mean(r["wrong_rays_per_million"] for r in rows)
+    return f"{value:.2f}" if value < 10 else f"{value:,.0f}"
+
+
 class Reports:
     """All rows of all models and views, by setting."""
 
@@ -126,7 +131,7 @@ def print_settings(all_of, settings):
                      f"{geometric(r['ns_per_query'] for r in found):.2f}",
                      f"{100 * geometric(r['bytes'] / k['bytes'] for r, k in zip(found, kd)):.0f}",
                      shown(mean(decibels(r) for r in found)), shown(min(decibels(r) for r in found)),
-                     f"{mean(r['wrong_rays_per_million'] for r in found):.2f}",
+                     wrong_rays(found),
                      f"{max(r['border_error_px'] for r in found):.2f}"])
     table(["trims", "frame, × kd", "ns a query", "bytes, % of kd", "PSNR mean, dB", "worst", "wrong rays a million",
            "border error, px"], rows)
@@ -146,8 +151,7 @@ def print_models(all_of):
                      " ".join(f"{geometric(r['ns_per_query'] for r in found):.1f}"
                               for found in (kd, exact, hybrid, sdf)),
                      " / ".join(shown(decibels(r)) for r in paper), " / ".join(shown(decibels(r)) for r in sdf),
-                     f"{mean(r['wrong_rays_per_million'] for r in exact):.2f}",
-                     f"{mean(r['wrong_rays_per_million'] for r in sdf):.0f}",
+                     wrong_rays(exact), wrong_rays(sdf),
                      f"{max(r['border_error_px'] for r in exact):.2f}", f"{max(r['border_error_px'] for r in sdf):.1f}"])
     table(["model", "trimmed faces", "kB kd, exact, sdf", "kd ms", "exact × kd", "hybrid", "sdf", "sdf mask/square",
            "ns a query kd, exact, hybrid, sdf", "dB mask/square " + " / ".join(v["view"] for v in
