@@ -57,7 +57,8 @@ bool trim_inside(const PackImage& image, uint face_id, float u, float v)
 
     bool inside = cell_class == kCellMixedCornerIn;
     for (const CellEntry* entry = image.cell_entries.data() + face.first_entry + (cell >> 2);; ++entry) {
-        const float* p = image.trim_points.data() + 2 * (static_cast<size_t>(face.first_point) + (entry->word >> kPiecePointShift));
+        const float* p =
+            image.trim_points.data() + 2 * (static_cast<size_t>(face.first_point) + (entry->word >> kPiecePointShift));
         const int last = (entry->word & kPieceCubic) != 0 ? 3 : 1;
         // from the lower end a to the upper end b
         const bool flipped = p[1] > p[2 * last + 1];
