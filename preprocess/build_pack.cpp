@@ -142,8 +142,10 @@ void convert_surface(ConvertedFace& face, const PartFrame& frame, TrimOptions op
     Status appended = append();
     if (!appended.ok() && options.grow) {
         // beyond its knots a rational spline may have weights that are not positive: then its border stays
+        const Vec2d corner = face.trims.domain.lo;
         options.grow = false;
         convert_trims(face, options);
+        face.trims.findings.push_back({TrimFindingKind::NotGrown, corner, 0, -1, -1, NotGrownReason::Surface});
         if (face.dropped_reason.empty())
             appended = append();
     }

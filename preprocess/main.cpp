@@ -242,8 +242,9 @@ Json findings_json(const std::vector<FaceFinding>& findings)
 Json finding_counts(const std::vector<FaceFinding>& findings)
 {
     Json counts = Json::object();
-    for (const TrimFindingKind kind : {TrimFindingKind::OpenLoop, TrimFindingKind::TurnedLoop,
-                                       TrimFindingKind::TouchingLoops, TrimFindingKind::CrossingLoops})
+    for (const TrimFindingKind kind :
+         {TrimFindingKind::OpenLoop, TrimFindingKind::TurnedLoop, TrimFindingKind::TouchingLoops,
+          TrimFindingKind::CrossingLoops, TrimFindingKind::NotGrown})
         counts[finding_name(kind)] = std::count_if(
             findings.begin(), findings.end(), [&](const FaceFinding& found) { return found.finding.kind == kind; });
     return counts;

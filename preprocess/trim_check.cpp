@@ -196,6 +196,19 @@ void find_turned(const std::vector<CheckedLoop>& loops, const Rect2d& domain, st
     }
 }
 
+const char* not_grown_text(NotGrownReason reason)
+{
+    switch (reason) {
+    case NotGrownReason::CrossesItself:
+        return "it crosses itself or another loop";
+    case NotGrownReason::NoRoom:
+        return "it is narrower than that";
+    case NotGrownReason::Surface:
+        break;
+    }
+    return "beyond its knots the surface has weights that are not positive";
+}
+
 } // namespace
 
 const char* finding_name(TrimFindingKind kind)
@@ -208,9 +221,11 @@ const char* finding_name(TrimFindingKind kind)
     case TrimFindingKind::TouchingLoops:
         return "loops touch";
     case TrimFindingKind::CrossingLoops:
+        return "loops cross";
+    case TrimFindingKind::NotGrown:
         break;
     }
-    return "loops cross";
+    return "loop is not grown";
 }
 
 std::string finding_detail(const TrimFinding& finding)
@@ -224,6 +239,10 @@ std::string finding_detail(const TrimFinding& finding)
     case TrimFindingKind::TouchingLoops:
     case TrimFindingKind::CrossingLoops:
         break;
+    case TrimFindingKind::NotGrown:
+        return fmt::format("{} {} was not moved outwards by what its neighbours may miss it by: {}",
+                           finding.loop < 0 ? "a border" : fmt::format("loop {}", finding.loop), at,
+                           not_grown_text(finding.reason));
     }
     if (finding.loop == finding.other)
         return fmt::format("loop {} meets itself {}", finding.loop, at);

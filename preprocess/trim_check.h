@@ -22,6 +22,13 @@ enum class TrimFindingKind : uint8_t {
     TurnedLoop,    // an outer loop runs clockwise, or a hole counter-clockwise, in uv
     TouchingLoops, // two pieces that do not follow each other have a point in common
     CrossingLoops, // two pieces pass each other
+    NotGrown,      // a loop could not be moved outwards by what its neighbours may miss it by (trim_grow.h)
+};
+
+enum class NotGrownReason : uint8_t {
+    CrossesItself, // or another loop: neither side of it is the inside all along
+    NoRoom,        // a hole that would close, or an outer loop turned inside out
+    Surface,       // beyond its knots the face's spline has weights that are not positive: none of its loops was moved
 };
 
 struct TrimFinding {
@@ -29,9 +36,10 @@ struct TrimFinding {
     Vec2d uv_file;           // where
     double gap_mm = 0;       // OpenLoop
     int loop = 0, other = 0; // of the face, in the order in which they were walked; Touching, Crossing: of both pieces
+    NotGrownReason reason = NotGrownReason::CrossesItself; // NotGrown
 };
 
-/// "loop is open", "loop is turned round", "loops touch", "loops cross".
+/// "loop is open", "loop is turned round", "loops touch", "loops cross", "loop is not grown".
 const char* finding_name(TrimFindingKind kind);
 
 /// Where and how much, in a few words.

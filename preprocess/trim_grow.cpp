@@ -455,7 +455,14 @@ Rect2d grow_loops(std::vector<TrimChain>& chains, const CadSurface& surface, con
                 bounds.hi = {std::max(bounds.hi.x, r.hi.x), std::max(bounds.hi.y, r.hi.y)};
                 continue;
             }
-        report.loops_not_grown += 1;
+        const Vec2d at = chain.pieces.front().p[0];
+        report.not_grown.push_back(
+            {TrimFindingKind::NotGrown,
+             {std::lerp(domain.lo.x, domain.hi.x, at.x), std::lerp(domain.lo.y, domain.hi.y, at.y)},
+             0,
+             chain.loop,
+             chain.loop,
+             inside == Inside::Mixed ? NotGrownReason::CrossesItself : NotGrownReason::NoRoom});
     }
     const Vec2d size{domain.hi.x - domain.lo.x, domain.hi.y - domain.lo.y};
     const Rect2d wanted{{domain.lo.x + bounds.lo.x * size.x, domain.lo.y + bounds.lo.y * size.y},

@@ -10,8 +10,8 @@
 namespace trimray {
 
 struct GrowReport {
-    double largest_mm = 0; // that a piece was moved out by, at a right angle to itself
-    int loops_not_grown = 0;
+    double largest_mm = 0;              // that a piece was moved out by, at a right angle to itself
+    std::vector<TrimFinding> not_grown; // a NotGrown for each loop that stays
 };
 
 /// Moves the pieces of closed loops outwards: each by its grow_mm and by rounding, measured on the surface at a right
@@ -21,7 +21,7 @@ struct GrowReport {
 /// new border within kGrowReach times the growth of the old one (but for loops narrower than their growth and notches
 /// sharper than about 30 degrees).
 /// A loop that crosses itself has no inside to grow from, and a hole that its growth would close no inside to shrink
-/// to: both stay and are counted.
+/// to: both stay and are reported.
 /// Units: `chains` in uv_face of `domain`; afterwards in uv_face of the domain returned, which bounds them. It goes no
 /// farther than a period, a pole or an apex, or a hundredth of a spline's end span beyond its knots.
 Rect2d grow_loops(std::vector<TrimChain>& chains, const CadSurface& surface, const Rect2d& domain, GrowReport& report);

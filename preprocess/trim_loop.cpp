@@ -270,7 +270,7 @@ Result<TrimLoops> build_trim_loops(const CadFace& face, const TrimOptions& optio
         GrowReport grown;
         loops.domain = grow_loops(chains, face.surface, loops.domain, grown);
         loops.largest_growth_mm = grown.largest_mm;
-        loops.loops_not_grown = grown.loops_not_grown;
+        loops.findings.insert(loops.findings.end(), grown.not_grown.begin(), grown.not_grown.end());
     }
     for (const TrimChain& chain : chains)
         append_loop(chain.pieces, class_of, loops);

@@ -29,7 +29,6 @@ struct TrimLoops {
     double largest_deviation = 0; // of the simplification, relative to the domain
     std::vector<TrimFinding> findings;
     double largest_growth_mm = 0; // that a piece was moved outwards by
-    int loops_not_grown = 0;      // they cross themselves, or are holes smaller than their growth
 };
 
 /// Fails: InvalidTrim with the reason (no area, not finite, ...).

@@ -546,6 +546,7 @@ class Pack(CliTest):
         self.assertLess(trims["largest_pcurve_deviation_mm"], 1)
         self.assertLessEqual(len(trims["edges_above_tolerance"]), trims["pcurves_above_tolerance"])
         self.assertEqual(sum(trims["findings"].values()), len(report["trim_findings"]))
+        self.assertEqual(trims["findings"]["loop is not grown"], 0)
 
     def test_says_what_is_doubtful_about_trims(self):
         text = self.ok("pack", MODEL, "-o", WORK / "again.tray").stdout

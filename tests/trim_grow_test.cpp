@@ -1,13 +1,15 @@
 // Loops moved outwards: the old border and what lies within its growth are inside, the new one is near, and loops stay
 // closed and monotone.
-#include "preprocess/trim_loop.h"
+#include "preprocess/build_pack.h"
 
 #include "preprocess/bezier_patch.h"
 #include "tests/trim_shapes.h"
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <numbers>
 
 namespace trimray {
@@ -107,6 +109,14 @@ struct Region {
     }
 };
 
+std::vector<TrimFinding> not_grown(const std::vector<TrimFinding>& findings)
+{
+    std::vector<TrimFinding> found;
+    std::copy_if(findings.begin(), findings.end(), std::back_inserter(found),
+                 [](const TrimFinding& finding) { return finding.kind == TrimFindingKind::NotGrown; });
+    return found;
+}
+
 Region region_of(const CadFace& face, bool grow)
 {
     Region region;
@@ -145,7 +155,7 @@ void expect_grown(const std::vector<std::vector<SplineCurve2d>>& loops, double g
     const CadFace face = face_of(loops, gap_mm);
     const Region before = region_of(face, false), after = region_of(face, true);
     EXPECT_GE(after.loops.largest_growth_mm, gap_mm) << name;
-    EXPECT_EQ(after.loops.loops_not_grown, 0) << name;
+    EXPECT_EQ(not_grown(after.loops.findings).size(), 0u) << name;
     int left_out = 0, walked = 0;
     before.walk(37, [&](Vec2d p, Vec2d d) {
         const double s = least * gap_mm / std::hypot(d.x, d.y);
@@ -297,17 +307,55 @@ TEST(trim_grow, a_spline_is_continued_by_a_hair_beyond_its_knots)
     EXPECT_NEAR(region_of(face, true).loops.domain.lo.x, -0.01, 1e-9);
 }
 
-TEST(trim_grow, what_has_no_outside_stays_and_is_counted)
+TEST(trim_grow, a_surface_that_cannot_be_continued_keeps_its_border_and_is_reported)
+{
+    CadFace face = face_of({polygon({{0, 0}, {1, 0}, {1, 1}, {0, 1}})}, 50);
+    face.surface.kind = kKindBezier;
+    SplineSurface& s = face.surface.spline;
+    s.degree_u = 2;
+    s.count_u = 3;
+    s.count_v = 2;
+    s.rational = true;
+    s.knots_u = {0, 0, 0, 1, 1, 1};
+    s.knots_v = {0, 0, 1, 1};
+    for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 2; ++j) {
+            const double w = i == 2 ? 1e-3 : 1; // falls to 0 within a hundredth of the span beyond its end
+            s.control_points.push_back({10.0 * i * w, 10.0 * j * w, 0, w});
+        }
+    face.surface.natural_bounds = {{0, 0}, {1, 1}};
+    CadModel model;
+    model.parts.resize(1);
+    model.parts[0].faces = {face};
+    model.parts[0].edges.resize(4);
+    BuildOptions options;
+    options.compact = true;
+    BuildReport report;
+    const PackImage image = build_pack(model, options, report);
+    ASSERT_EQ(image.faces.size(), 1u);
+    EXPECT_EQ(image.faces[0].domain_hi[0], 1);
+    ASSERT_EQ(report.trim_findings.size(), 1u);
+    EXPECT_EQ(report.trim_findings[0].finding.kind, TrimFindingKind::NotGrown);
+    EXPECT_EQ(report.trim_findings[0].finding.reason, NotGrownReason::Surface);
+}
+
+TEST(trim_grow, what_has_no_outside_stays_and_is_reported)
 {
     const CadFace eight = face_of({polygon({{0, 0}, {10, 10}, {10, 0}, {0, 10}})}, 1e-3);
     const Region crossed = region_of(eight, true);
-    EXPECT_EQ(crossed.loops.loops_not_grown, 1);
+    ASSERT_EQ(not_grown(crossed.loops.findings).size(), 1u);
+    EXPECT_EQ(not_grown(crossed.loops.findings)[0].reason, NotGrownReason::CrossesItself);
     EXPECT_EQ(crossed.loops.points, region_of(eight, false).loops.points);
 
     const CadFace pierced =
         face_of({polygon({{0, 0}, {10, 0}, {10, 10}, {0, 10}}), {circle_curve({5, 5}, 1e-2)}}, 0.05);
     const Region hole = region_of(pierced, true);
-    EXPECT_EQ(hole.loops.loops_not_grown, 1);
+    ASSERT_EQ(not_grown(hole.loops.findings).size(), 1u);
+    const TrimFinding narrow = not_grown(hole.loops.findings)[0];
+    EXPECT_EQ(narrow.reason, NotGrownReason::NoRoom);
+    EXPECT_EQ(narrow.loop, 1);
+    EXPECT_LT(std::hypot(narrow.uv_file.x - 5, narrow.uv_file.y - 5), 2e-2);
+    EXPECT_EQ(finding_detail(narrow).find("loop 1 at u "), 0u) << finding_detail(narrow);
     EXPECT_FALSE(hole.inside(5, 5));
 }
 
