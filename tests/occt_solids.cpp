@@ -16,13 +16,20 @@
 #include <BRepPrimAPI_MakeSphere.hxx>
 #include <BRepPrimAPI_MakeTorus.hxx>
 #include <BRepTools.hxx>
+#include <BRep_Builder.hxx>
 #include <BRep_Tool.hxx>
+#include <Geom2d_Curve.hxx>
 #include <GeomAPI_Interpolate.hxx>
 #include <Geom_BSplineCurve.hxx>
+#include <Geom_Surface.hxx>
 #include <Standard_Failure.hxx>
 #include <TColgp_HArray1OfPnt.hxx>
 #include <TopExp_Explorer.hxx>
+#include <TopLoc_Location.hxx>
 #include <TopoDS.hxx>
+#include <TopoDS_Edge.hxx>
+#include <TopoDS_Face.hxx>
+#include <TopoDS_Wire.hxx>
 #include <gp_Ax1.hxx>
 #include <gp_Ax2.hxx>
 #include <gp_Trsf.hxx>
@@ -155,6 +162,35 @@ bool write_closed_solid(Solid solid, const std::string& path)
         turned.SetRotation(gp_Ax1(gp_Pnt(3, 1, 2), gp_Dir(1, 2, 3)), 0.7);
         const TopoDS_Shape shape = BRepBuilderAPI_Transform(make(solid), turned, true).Shape();
         return valid_and_closed(shape) && BRepTools::Write(shape, path.c_str());
+    } catch (const Standard_Failure&) {
+        return false;
+    }
+}
+
+bool write_closed_face(ClosedFace kind, const std::string& path)
+{
+    try {
+        const bool sphere = kind == ClosedFace::Sphere || kind == ClosedFace::SphereSeamOnly;
+        const TopoDS_Shape solid = sphere ? BRepPrimAPI_MakeSphere(20).Shape() : BRepPrimAPI_MakeTorus(30, 8).Shape();
+        TopoDS_Face face = TopoDS::Face(TopExp_Explorer(solid, TopAbs_FACE).Current());
+        if (kind == ClosedFace::SphereSeamOnly || kind == ClosedFace::TorusSeamOnly) {
+            TopLoc_Location place;
+            const Handle(Geom_Surface) surface = BRep_Tool::Surface(face, place);
+            const BRep_Builder builder;
+            TopoDS_Wire wire;
+            builder.MakeWire(wire);
+            for (TopExp_Explorer at(face, TopAbs_EDGE); at.More(); at.Next()) {
+                const TopoDS_Edge& edge = TopoDS::Edge(at.Current());
+                double first = 0, last = 0;
+                const Handle(Geom2d_Curve) pcurve = BRep_Tool::CurveOnSurface(edge, face, first, last);
+                const bool along_v = std::abs(pcurve->Value(first).X() - pcurve->Value(last).X()) < 1e-9;
+                if (along_v && !BRep_Tool::Degenerated(edge))
+                    builder.Add(wire, edge);
+            }
+            builder.MakeFace(face, surface, place, 1e-7);
+            builder.Add(face, wire);
+        }
+        return BRepTools::Write(face, path.c_str());
     } catch (const Standard_Failure&) {
         return false;
     }

@@ -20,6 +20,18 @@ const char* solid_name(Solid solid);
 /// One solid, about 100 mm in size, along no axis. False: not made, or not valid and closed by the kernel's own check.
 bool write_closed_solid(Solid solid, const std::string& path);
 
+/// A closed surface that is a face of its own, about the origin, its axis z and its seam at +x: a sphere of radius 20,
+/// or a torus of radii 30 and 8.
+enum class ClosedFace {
+    Sphere, // a loop of its seam and two poles
+    Torus,  // a loop of both its seams
+    SphereSeamOnly,
+    TorusSeamOnly, // one of its seams; the other is in no loop
+};
+
+/// False: not made.
+bool write_closed_face(ClosedFace face, const std::string& path);
+
 /// A cylinder of radius 20 and height 60 around z, with a hole of radius 8 drilled through its wall along x; its seam
 /// is turned by `turn` radians from the hole. False: not made.
 bool write_drilled_seam(double turn, const std::string& path);
