@@ -93,6 +93,17 @@ FaceGrid grid_of(const PackImage& image, const FaceRecord& face)
     return grid;
 }
 
+uint8_t classes_of(const PackImage& image, const FaceRecord& face)
+{
+    uint classes = 0;
+    if ((face.flags & kFaceNaturalBorder) != 0)
+        for (uint side = 0; side < 4; ++side)
+            classes |= 1u << (face.border_classes >> 2 * side & 3u);
+    for (uint i = 0; i < face.piece_count; ++i)
+        classes |= 1u << (image.trim_pieces[face.first_piece + i] >> kPieceClassShift & 3u);
+    return static_cast<uint8_t>(classes);
+}
+
 } // namespace
 
 BorderCells make_border_cells(const PackImage& image)
@@ -100,6 +111,8 @@ BorderCells make_border_cells(const PackImage& image)
     std::vector<FaceGrid> grids(image.faces.size());
     tbb::parallel_for(size_t{0}, grids.size(), [&](size_t f) { grids[f] = grid_of(image, image.faces[f]); });
     BorderCells out;
+    for (const FaceRecord& face : image.faces)
+        out.classes.push_back(classes_of(image, face));
     out.words.resize(2 * grids.size());
     for (size_t f = 0; f < grids.size(); ++f) {
         const FaceGrid& grid = grids[f];

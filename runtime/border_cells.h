@@ -15,6 +15,7 @@ namespace trimray {
 /// follows the last cell. A piece is its TrimPiece word (pack_layout.h); pieces along seams are left out.
 struct BorderCells {
     std::vector<uint32_t> words;
+    std::vector<uint8_t> classes; // by face: bits kEdge... of its borders, of natural ones too
 };
 
 /// Domain: a validated image. Cells are about square on the surface, about two a piece.

@@ -20,6 +20,7 @@
 #include "shaders/shared/trim_lookup.h"
 
 #include <algorithm>
+#include <array>
 #include <cstring>
 
 SHARED_OPEN
@@ -33,8 +34,9 @@ public:
             views_.assign(kViews, {});
     }
 
-    /// Notes what is near the packet whose first pixel is (x, y) of the picture.
-    HWY_ATTR void find(const Packet& packet, const PacketHit& hit, uint32_t x, uint32_t y)
+    /// Notes what is near the packet whose first pixel is (x, y) of the picture; its colours begin at `rgba`, in a
+    /// strip.
+    HWY_ATTR void find(const Packet& packet, const PacketHit& hit, uint32_t x, uint32_t y, float* rgba)
     {
         const size_t at = job_.edges->map.packet_of(x, y);
         uint8_t& near = job_.edges->map.near[at];
@@ -59,8 +61,11 @@ public:
         }
         const EdgeQuery& query = job_.edges->query;
         EdgeMap& map = job_.edges->map;
-        if (query.line_reach_px > 0 && keep(line, query.line_reach_px, &map.line[16 * at]))
+        if (query.line_reach_px > 0 && keep(line, query.line_reach_px, &map.line[16 * at])) {
             near |= kNearLine;
+            if (map.own_halves_drawn)
+                draw_own_halves(&map.line[16 * at], leaves, instances, rgba);
+        }
         if (query.border_reach_px > 0 && keep(border, query.border_reach_px, &map.border[16 * at]))
             near |= kNearBorder;
     }
@@ -80,6 +85,12 @@ private:
     static bool contains(const UvBox& outer, const UvBox& inner)
     {
         return inner.u0 > outer.u0 && inner.u1 < outer.u1 && inner.v0 > outer.v0 && inner.v1 < outer.v1;
+    }
+
+    bool is_asked(uint edge_class) const { return (job_.edges->query.classes() >> edge_class & 1u) != 0; }
+    bool has_asked_borders(uint face_id) const
+    {
+        return (job_.edges->query.classes() & job_.edges->cells.classes[face_id]) != 0;
     }
 
     uint face_of(uint leaf) const { return image_.patches[image_.leaves[leaf].patch].face; }
@@ -110,9 +121,29 @@ private:
         return true;
     }
 
+    /// Draws lines over their own pixels while these are in the caches.
+    void draw_own_halves(const uint* words, const uint (&leaves)[kLanes], const uint (&instances)[kLanes],
+                         float* rgba) const
+    {
+        const RenderOptions& options = job_.edges->options;
+        for (uint lane = 0; lane < kLanes; ++lane) {
+            if (words[lane] == 0)
+                continue;
+            const float share = own_line_share(words[lane], options.edge_width_px);
+            if (!(share > 0))
+                continue;
+            const std::array<float, 3> color = line_color_on(image_, options, face_of(leaves[lane]), instances[lane]);
+            float* const pixel = rgba + lane / 4 * (4 * kBlockSide) + 4 * (lane % 4);
+            for (size_t c = 0; c < 3; ++c)
+                pixel[c] = (1 - share) * pixel[c] + share * color[c];
+        }
+    }
+
     /// True only if a packet of 16 hits of one face has no border within reach of any.
     HWY_ATTR bool far_from_borders(uint face_id, real2 uv)
     {
+        if (!has_asked_borders(face_id))
+            return true;
         // between neighbouring pixels uv steps by J_x and J_y; the packet's diagonals are 3 (J_x + J_y) and
         // 3 (J_x - J_y), so the longer component of them is at least 3 |J|. Half as much again for what bends.
         alignas(64) float u[kLanes], v[kLanes];
@@ -126,18 +157,17 @@ private:
         if (face_id == free_face_ && contains(free_, box))
             return true;
         const FaceRecord& face = image_.faces[face_id];
-        const bool free = (face.flags & kFaceNaturalBorder) != 0 ? free_of_sides(face) : free_of_pieces(face_id, box);
+        const bool natural = (face.flags & kFaceNaturalBorder) != 0;
+        const bool free = natural ? free_of_sides(face) : free_of_pieces(face_id, box);
         free_face_ = free ? face_id : ~0u;
-        return free && contains(free_, box);
+        return free ? contains(free_, box) : !natural && beside_pieces(face, face_id, box);
     }
 
     static uint side_class(const FaceRecord& face, uint side) { return face.border_classes >> 2 * side & 3u; }
 
     bool free_of_sides(const FaceRecord& face)
     {
-        const auto bound = [&](uint side, float at, float far) {
-            return side_class(face, side) == kEdgeSeam ? far : at;
-        };
+        const auto bound = [&](uint side, float at, float far) { return is_asked(side_class(face, side)) ? at : far; };
         free_ = {bound(0, 0, -kHuge), bound(1, 1, kHuge), bound(2, 0, -kHuge), bound(3, 1, kHuge)};
         return true;
     }
@@ -193,6 +223,43 @@ private:
                  j0 == 0 ? -kHuge : static_cast<float>(j0) * per_row,
                  j1 + 1 == grid.rows ? kHuge : static_cast<float>(j1 + 1) * per_row};
         return true;
+    }
+
+    /// True only if no piece that is asked for comes into the box.
+    bool beside_pieces(const FaceRecord& face, uint face_id, const UvBox& box) const
+    {
+        const Grid grid = grid_of(face_id);
+        const uint i0 = index_of(box.u0, grid.columns), i1 = index_of(box.u1, grid.columns);
+        const uint j0 = index_of(box.v0, grid.rows), j1 = index_of(box.v1, grid.rows);
+        const uint* words = job_.edges->cells.words.data();
+        for (uint j = j0; j <= j1; ++j) {
+            const uint* cells = grid.cells + j * grid.columns;
+            for (uint at = cells[i0]; at < cells[i1 + 1]; ++at) {
+                if (!is_asked(words[at] >> kPieceClassShift & 3u))
+                    continue;
+                const float* p =
+                    image_.trim_points.data() + 2 * (size_t(face.first_point) + (words[at] >> kPiecePointShift));
+                const uint last = (words[at] & kPieceCubic) != 0 ? 3 : 1;
+                if (!outside(box, p, last) && !aside(box, p, last))
+                    return false;
+            }
+        }
+        return true;
+    }
+
+    /// Whether a piece's control points all lie on one side of the box, across the piece's chord.
+    static bool aside(const UvBox& box, const float* p, uint last)
+    {
+        const float nu = p[1] - p[2 * last + 1], nv = p[2 * last] - p[0];
+        const float u = 0.5f * (box.u0 + box.u1), v = 0.5f * (box.v0 + box.v1);
+        const float half = 0.5f * (std::abs(nu) * (box.u1 - box.u0) + std::abs(nv) * (box.v1 - box.v0));
+        float lo = kHuge, hi = -kHuge;
+        for (uint i = 0; i <= last; ++i) {
+            const float across = nu * (p[2 * i] - u) + nv * (p[2 * i + 1] - v);
+            lo = std::min(lo, across);
+            hi = std::max(hi, across);
+        }
+        return lo > half || hi < -half;
     }
 
     const PatchView& view_of(const PatchRecord& patch, uint patch_id, uint instance)
@@ -278,6 +345,8 @@ private:
                                Nearest& line, Nearest& border)
     {
         const uint face_id = face_of(leaf);
+        if (!has_asked_borders(face_id))
+            return;
         const FaceRecord& face = image_.faces[face_id];
         Asked asked = asked_of(packet, hit, leaf, instance, lanes);
         const Grid grid = grid_of(face_id);
@@ -346,7 +415,7 @@ private:
         const bool reached[4] = {box.u0 <= 0, box.u1 >= 1, box.v0 <= 0, box.v1 >= 1};
         for (uint side = 0; side < 4; ++side) {
             const uint edge_class = side_class(face, side);
-            if (!reached[side] || edge_class == kEdgeSeam)
+            if (!reached[side] || !is_asked(edge_class))
                 continue;
             const float at = side % 2 == 0 ? 0.0f : 1.0f;
             const scalar2 a = side < 2 ? scalar2(at, 0) : scalar2(0, at);
@@ -385,6 +454,8 @@ private:
             const uint* cells = grid.cells + j * grid.columns;
             for (uint at = cells[i0]; at < cells[i1 + 1]; ++at) {
                 const uint word = words[at];
+                if (!is_asked(word >> kPieceClassShift & 3u))
+                    continue;
                 if (std::find(done, done + done_count, word) != done + done_count)
                     continue;
                 if (done_count == kMostPieces)
@@ -418,8 +489,6 @@ private:
         work_.edge_tests += uint64_t(__builtin_popcount(asked.lanes));
         const EdgeQuery& query = job_.edges->query;
         const bool as_line = (query.line_classes >> edge_class & 1u) != 0, as_border = query.border_reach_px > 0;
-        if (!as_line && !as_border)
-            return;
         const real2 step = uv_face - asked.uv;
         real2 offset = to_pixels(asked.map, step);
         const float reach = query.reach_px();

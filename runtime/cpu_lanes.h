@@ -58,6 +58,7 @@ struct EdgeJob {
     EdgeQuery query;
     const BorderCells& cells;
     EdgeMap& map;
+    const RenderOptions& options; // what lines look like
 };
 
 struct BlockJob {

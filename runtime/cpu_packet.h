@@ -61,7 +61,7 @@ public:
                         const PacketHit hit = trace_packet(packet, pixel_rect({x, y, x + 4, y + 4}));
                         write_packet(job_, packet, hit, x - block.x0, y - ty, scratch_.strip, work_);
                         if (job_.edges)
-                            edges_.find(packet, hit, x, y);
+                            edges_.find(packet, hit, x, y, &scratch_.strip.rgba[y - ty][4 * (x - block.x0)]);
                     }
                 }
             }

@@ -124,7 +124,8 @@ private:
             const EdgeQuery query = edge_query(options);
             edge_map_.resize(options.width, options.height, query);
             if (query.any())
-                edges.emplace(EdgeJob{query, *border_cells_, edge_map_});
+                edges.emplace(EdgeJob{query, *border_cells_, edge_map_, options});
+            edge_map_.own_halves_drawn = own_halves_alone(options);
         }
         job.edges = edges ? &*edges : nullptr;
         const uint32_t columns = (options.width + kBlockSide - 1) / kBlockSide,

@@ -75,6 +75,8 @@ const std::array<float, 256>& linear_of_byte()
     return table;
 }
 
+constexpr std::array<float, 3> kDarkLine = {0.012f, 0.012f, 0.015f}, kLightLine = {0.22f, 0.22f, 0.23f};
+
 constexpr uint32_t kNone = ~0u;
 
 /// What happens to one pixel.
@@ -160,6 +162,8 @@ private:
     static bool stands_for(Offset line, Offset border);
     void fetch_early(uint32_t column, uint32_t row) const;
     bool has_line_towards(int x, int y, int dx, int dy) const;
+    float drawn_share(int x, int y) const;
+    std::array<float, 4> color_below(int x, int y) const;
     std::array<float, 4> color(size_t i) const;
     std::array<float, 3> line_color(size_t i) const;
 
@@ -375,19 +379,48 @@ bool Effects::has_line_towards(int x, int y, int dx, int dy) const
     return line.x * float(dx) + line.y * float(dy) > 0;
 }
 
+/// The share of (x, y) that its own line has in the frame as it was traced.
+float Effects::drawn_share(int x, int y) const
+{
+    if (!map_.own_halves_drawn || (map_.near[map_.packet_of(uint32_t(x), uint32_t(y))] & kNearLine) == 0)
+        return 0;
+    const uint32_t word = map_.line[map_.word_of(uint32_t(x), uint32_t(y))];
+    return word != 0 ? own_line_share(word, options_.edge_width_px) : 0.0f;
+}
+
+/// The colour that (x, y) would have without its own line; its own colour where the line covers all of it.
+std::array<float, 4> Effects::color_below(int x, int y) const
+{
+    const size_t i = at(x, y);
+    std::array<float, 4> rgba = color(i);
+    const float share = drawn_share(x, y);
+    if (share > 0 && share < 1) {
+        const std::array<float, 3> line = line_color(i);
+        for (size_t c = 0; c < 3; ++c)
+            rgba[c] = (rgba[c] - share * line[c]) / (1 - share);
+    }
+    return rgba;
+}
+
 /// The line along the border at `offset` of (x, y): this pixel's share, and beyond an outline the other half.
 void Effects::draw_line(BandMarks& band, int x, int y, Offset offset, int y0, int y1) const
 {
     const size_t i = at(x, y);
     const float width = options_.edge_width_px, distance = offset.length();
     const auto raise = [&](int tx, int ty, float alpha) {
-        Mark* const m = alpha > 0 ? mark(band, tx, ty, y0, y1) : nullptr;
+        const float drawn = drawn_share(tx, ty);
+        // of equal lines the first has the pixel, in the order of packets
+        const bool first = map_.word_of(uint32_t(x), uint32_t(y)) < map_.word_of(uint32_t(tx), uint32_t(ty));
+        const bool stronger = alpha > drawn || (alpha == drawn && alpha > 0 && first);
+        Mark* const m = stronger ? mark(band, tx, ty, y0, y1) : nullptr;
         if (m && alpha > m->line) {
+            __builtin_prefetch(&frame_.rgba[4 * at(tx, ty)]);
             m->line = alpha;
             m->line_from = static_cast<uint32_t>(i);
         }
     };
-    raise(x, y, line_coverage(distance, width) * offset.strength);
+    if (!map_.own_halves_drawn)
+        raise(x, y, line_coverage(distance, width) * offset.strength);
     if (!(distance > 0))
         return;
     // beyond an outline: along each axis that the border's normal leans to, or steps of a slanting line are missed
@@ -460,25 +493,14 @@ std::array<float, 4> Effects::color(size_t i) const
     return {frame_.rgba[4 * i], frame_.rgba[4 * i + 1], frame_.rgba[4 * i + 2], frame_.rgba[4 * i + 3]};
 }
 
-/// The colour asked for, or one that shows on the face of pixel i.
+/// The colour of the lines of pixel i's face.
 std::array<float, 3> Effects::line_color(size_t i) const
 {
     if (options_.edge_color)
         return *options_.edge_color;
-    constexpr std::array<float, 3> kDark = {0.012f, 0.012f, 0.015f}, kLight = {0.22f, 0.22f, 0.23f};
     if (!options_.fill || !is_hit(i))
-        return kDark;
-    const FaceRecord& face = image_.faces[size_t(frame_.face[i])];
-    uint32_t rgba = image_.instances[size_t(frame_.instance[i])].color_rgba;
-    if ((face.flags & kFaceHasColor) != 0)
-        rgba = face.color_rgba;
-    else if (rgba >> 24 == 0)
-        return kDark; // the default grey is light
-    const std::array<float, 256>& linear = linear_of_byte();
-    const float luminance =
-        0.2126f * linear[rgba & 0xffu] + 0.7152f * linear[rgba >> 8 & 0xffu] + 0.0722f * linear[rgba >> 16 & 0xffu];
-    constexpr float kDarkFace = 0.045f; // sRGB 59 of 255
-    return luminance < kDarkFace ? kLight : kDark;
+        return kDarkLine;
+    return line_color_on(image_, options_, uint32_t(frame_.face[i]), uint32_t(frame_.instance[i]));
 }
 
 /// Whether a line within a pixel runs along the border, so that it is its outline too: a fillet's rim beside its
@@ -522,7 +544,7 @@ std::vector<Painted> Effects::paint(uint32_t band_index) const
         for (uint32_t column = 0; column < map_.columns; ++column) {
             const size_t packet = size_t{row} * map_.columns + column;
             constexpr uint32_t kAhead = 6; // packets: memory takes as long as so many are worked on
-            if (column + kAhead < map_.columns && map_.near[packet + kAhead] != 0)
+            if (!map_.own_halves_drawn && column + kAhead < map_.columns && map_.near[packet + kAhead] != 0)
                 fetch_early(column + kAhead, row);
             const uint8_t near = map_.near[packet];
             if (near == 0)
@@ -553,7 +575,7 @@ std::vector<Painted> Effects::paint(uint32_t band_index) const
                 continue;
             const int x = int(4 * (packet % map_.columns) + i % 4), y = y0 + int(4 * (packet / map_.columns) + i / 4);
             // straight alpha: colours are mixed by the alpha that they bring
-            std::array<float, 4> rgba = color(at(x, y));
+            std::array<float, 4> rgba = color_below(x, y);
             const auto mix = [&rgba](const std::array<float, 4>& other, float share) {
                 const float own = (1 - share) * rgba[3], added = share * other[3], alpha = own + added;
                 for (size_t c = 0; c < 3; ++c)
@@ -601,6 +623,36 @@ EdgeQuery edge_query(const RenderOptions& options)
     else if (options.antialias_trims)
         query.border_reach_px = 1;
     return query;
+}
+
+bool own_halves_alone(const RenderOptions& options)
+{
+    const EdgeQuery query = edge_query(options);
+    return query.line_reach_px > 0 && query.border_reach_px == 0 && options.fill;
+}
+
+float own_line_share(uint32_t word, float width_px)
+{
+    const Offset offset = offset_of(word);
+    return line_coverage(offset.length(), width_px) * offset.strength;
+}
+
+std::array<float, 3> line_color_on(const PackImage& image, const RenderOptions& options, uint32_t face,
+                                   uint32_t instance)
+{
+    if (options.edge_color)
+        return *options.edge_color;
+    const FaceRecord& record = image.faces[face];
+    uint32_t rgba = image.instances[instance].color_rgba;
+    if ((record.flags & kFaceHasColor) != 0)
+        rgba = record.color_rgba;
+    else if (rgba >> 24 == 0)
+        return kDarkLine; // the default grey is light
+    const std::array<float, 256>& linear = linear_of_byte();
+    const float luminance =
+        0.2126f * linear[rgba & 0xffu] + 0.7152f * linear[rgba >> 8 & 0xffu] + 0.0722f * linear[rgba >> 16 & 0xffu];
+    constexpr float kDarkFace = 0.045f; // sRGB 59 of 255
+    return luminance < kDarkFace ? kLightLine : kDarkLine;
 }
 
 bool has_effects(const RenderOptions& options)

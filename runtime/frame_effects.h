@@ -1,6 +1,8 @@
 // What is drawn over a traced frame: lines along borders and silhouettes, and anti-aliased borders. A tracer notes for
 // each pixel where the nearest border of its face is (EdgeMap); a pass over the frame, the same for both tracers, draws
-// from these notes, the depths and the normals. It changes colours alone.
+// from these notes, the depths and the normals. It changes colours alone. Where lines along borders are all that is
+// asked for, a tracer may draw each line's share of its own pixel itself: the pass then reads the frame at outlines
+// only.
 //
 // A border belongs to both of its faces, and each pixel's face draws its side of a line. Where nothing borders on the
 // other side (the line is an outline, before a farther surface or the background), the pixels there get the other half
@@ -11,6 +13,7 @@
 #include "runtime/camera.h"
 #include "runtime/tracer.h"
 
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <vector>
@@ -24,6 +27,8 @@ struct EdgeQuery {
     float line_reach_px = 0;   // as far as lines need to be known
     float border_reach_px = 0; // as far as borders of any class need to be known (EdgeMap::border); 0: not at all
     bool any() const { return line_reach_px > 0 || border_reach_px > 0; }
+    /// Bits kEdge... of the borders that anything is asked about.
+    uint32_t classes() const { return border_reach_px > 0 ? ~(1u << kEdgeSeam) & 15u : line_classes; }
     float reach_px() const { return line_reach_px > border_reach_px ? line_reach_px : border_reach_px; }
 };
 EdgeQuery edge_query(const RenderOptions& options);
@@ -37,12 +42,24 @@ struct EdgeMap {
     uint32_t columns = 0, rows = 0; // packets
     std::vector<uint8_t> near;      // kNear... bits, by packet
     std::vector<uint32_t> line, border;
+    bool own_halves_drawn = false; // by the tracer: each line word's share of its own pixel is in the frame already
 
     void resize(uint32_t width, uint32_t height, const EdgeQuery& query);
     size_t packet_of(uint32_t x, uint32_t y) const { return size_t{y / 4} * columns + x / 4; }
     size_t word_of(uint32_t x, uint32_t y) const { return 16 * packet_of(x, y) + 4 * (y % 4) + x % 4; }
 };
 constexpr uint8_t kNearLine = 1, kNearBorder = 2;
+
+/// Whether a tracer may draw a line's share of its own pixel as it traces it: where nothing else changes that pixel's
+/// colour before, so that the pass has only outlines left.
+bool own_halves_alone(const RenderOptions& options);
+
+/// The share of its own pixel that the line of an edge word (not 0) takes, in [0, 1].
+float own_line_share(uint32_t word, float width_px);
+
+/// The colour of lines at borders of a face: the one asked for, or one that shows on the face. Linear light.
+std::array<float, 3> line_color_on(const PackImage& image, const RenderOptions& options, uint32_t face,
+                                   uint32_t instance);
 
 /// Runs body(i) for i in [0, count), at once where threads allow.
 using RunEach = std::function<void(uint32_t count, const std::function<void(uint32_t)>& body)>;

@@ -211,7 +211,7 @@ Status VulkanTracer::prepare_edges(const RenderOptions& options, uint32_t rows_p
 {
     edges_wanted_ = has_effects(options) && edge_query(options).any();
     if (!has_border_cells_ && (edges_wanted_ || buffers_[kBindBorders].size_bytes() == 0)) {
-        const BorderCells cells = edges_wanted_ ? make_border_cells(scene_->pack.image) : BorderCells{{0}};
+        const BorderCells cells = edges_wanted_ ? make_border_cells(scene_->pack.image) : BorderCells{{0}, {}};
         Result<VulkanBuffer> borders =
             upload_storage(*device_, std::as_bytes(std::span(cells.words)), "the borders' cells");
         if (!borders)
