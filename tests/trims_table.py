@@ -133,7 +133,7 @@ def print_settings(all_of, settings):
                      shown(mean(decibels(r) for r in found)), shown(min(decibels(r) for r in found)),
                      wrong_rays(found),
                      f"{max(r['border_error_px'] for r in found):.2f}"])
-    table(["trims", "frame, × kd", "ns a query", "bytes, % of kd", "PSNR mean, dB", "worst", "wrong rays a million",
+    table(["trims", "frames a second, × kd", "ns a query", "bytes, % of kd", "PSNR mean, dB", "worst", "wrong rays a million",
            "border error, px"], rows)
 
 
