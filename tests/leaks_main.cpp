@@ -22,6 +22,21 @@ struct Request {
     double rim = 1e-5; // of the diagonal, beside four times the file's tolerance
 };
 
+/// A tracer of a scene and what it counts by; null: refused, which is printed.
+struct Counted {
+    std::unique_ptr<Tracer> tracer;
+    hard::ClosedModel closed;
+};
+
+std::unique_ptr<Counted> counted(const std::string& path, std::shared_ptr<const Scene> scene, double rim_mm)
+{
+    auto tracer = make_cpu_tracer(scene);
+    if (tracer.ok())
+        return std::make_unique<Counted>(Counted{std::move(*tracer), hard::ClosedModel(scene, rim_mm)});
+    fmt::print("{}: {}\n", path, tracer.error().detail);
+    return nullptr;
+}
+
 int measure(const std::string& path, const Request& request)
 {
     const Result<CadModel> model = import_cad(path, {}, {});
@@ -51,15 +66,17 @@ int measure(const std::string& path, const Request& request)
         }
         auto scene = std::make_shared<Scene>();
         scene->pack = std::move(pack).value();
-        auto tracer = make_cpu_tracer(scene);
-        if (!tracer.ok()) {
-            fmt::print("{}: {}\n", path, tracer.error().detail);
-            return 1;
-        }
         const hard::Bounds bounds = hard::bounds_of(scene->pack.image);
-        const hard::ClosedModel closed(scene, 4 * tolerance_mm + request.rim * bounds.diagonal());
+        const double rim_mm = 4 * tolerance_mm + request.rim * bounds.diagonal();
+        const auto whole = counted(path, scene, rim_mm);
+        if (!whole)
+            return 1;
         if (views.empty())
-            views = hard::leak_views(**tracer, *scene, bounds, request.around, request.close_ups, request.pixels);
+            views = hard::leak_views(*whole->tracer, *scene, bounds, request.around, request.close_ups, request.pixels);
+        std::unique_ptr<Counted> within; // what the views from inside are in: all of them in one
+        for (const hard::LeakView& view : views)
+            if (view.inside && !within && !(within = counted(path, hard::alone(*scene, view.within), rim_mm)))
+                return 1;
         for (const TrimMode mode : {TrimMode::Exact, TrimMode::Hybrid}) {
             hard::LeakCount wide, close, inside;
             bool refused = false;
@@ -70,12 +87,13 @@ int measure(const std::string& path, const Request& request)
                 render.trim = mode;
                 render.shade = false;
                 RenderStats stats;
-                const auto frame = (*tracer)->render(render, stats);
+                const Counted& from = view.inside ? *within : *whole;
+                const auto frame = from.tracer->render(render, stats);
                 if (!frame.ok()) {
                     refused = true;
                     break;
                 }
-                const hard::LeakCount count = closed.count(render, *frame, view.inside);
+                const hard::LeakCount count = from.closed.count(render, *frame, view.inside);
                 (view.inside ? inside : view.camera.fov_deg < 29 ? close : wide) += count;
             }
             fmt::print("{:<40} {:<6} {:<5} gap {:.1e} tol {:.1e} mm | wide {:>5} + {:<5} of {:<9} close {:>5} + {:<6} "

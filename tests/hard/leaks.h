@@ -3,6 +3,7 @@
 // beyond the other by what its border was moved outwards, and that rim shows its back.
 #pragma once
 
+#include "format/derive.h"
 #include "format/trim_reference.h"
 #include "runtime/tracer.h"
 
@@ -122,8 +123,21 @@ private:
 /// A picture to count in.
 struct LeakView {
     Camera camera;
-    bool inside = false;
+    bool inside = false; // of the solids of instance `within`
+    uint32_t within = 0;
 };
+
+/// The scene of one placed part alone. Solids of an assembly may stand in one another: from within one of them the
+/// others' fronts are no leaks, and what it leaks must not end at another.
+inline std::shared_ptr<const Scene> alone(const Scene& scene, uint32_t instance)
+{
+    auto only = std::make_shared<Scene>();
+    only->pack = scene.pack;
+    PackImage& image = only->pack.image;
+    image.instances = {image.instances[instance]};
+    derive_trees(image);
+    return only;
+}
 
 struct Bounds {
     Point lo{1e300, 1e300, 1e300}, hi{-1e300, -1e300, -1e300};
@@ -247,7 +261,9 @@ inline std::vector<LeakView> leak_views(Tracer& tracer, const Scene& scene, cons
             const Point into = p - 1.0 * camera.eye;
             const Point just_in = p + (1e-4 * diagonal / std::sqrt(dot(into, into))) * into;
             const RayHit out = trace_ray(scene, just_in, into);
-            if (!out.hit || !(dot(out.normal, into) > 0) || out.distance_mm < 0.02 * diagonal)
+            const int32_t within_instance = frame->instance[size_t(y) * pixels + x];
+            if (!out.hit || out.instance != within_instance || !(dot(out.normal, into) > 0) ||
+                out.distance_mm < 0.02 * diagonal)
                 continue;
             const Point within = just_in + (0.5 * out.distance_mm / std::sqrt(dot(into, into))) * into;
             for (const Point& way :
@@ -257,7 +273,7 @@ inline std::vector<LeakView> leak_views(Tracer& tracer, const Scene& scene, cons
                 camera_in.target = within + diagonal * way;
                 camera_in.up = way[2] != 0 ? Point{1, 0, 0} : Point{0, 0, 1};
                 camera_in.fov_deg = 90;
-                views.push_back({camera_in, true});
+                views.push_back({camera_in, true, uint32_t(within_instance)});
             }
             have_inside = true;
         }
