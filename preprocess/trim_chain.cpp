@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 
 namespace trimray {
@@ -108,6 +109,59 @@ struct PlacedUse {
 };
 using Walk = std::vector<PlacedUse>;
 
+/// Where the walk has come to, and how a use would follow it there.
+struct WalkEnd {
+    const Joints& joints;
+    const PlacedUse& last;
+    double near_mm;
+
+    Vec2d at() const { return {last.use.end().x + last.shift.x, last.use.end().y + last.shift.y}; }
+    Vec2d shift(const Use& next) const { return joints.shift(at(), next.start(), last.shift, near_mm); }
+    double gap(const Use& next) const
+    {
+        const Vec2d s = shift(next);
+        return joints.distance(at(), {next.start().x + s.x, next.start().y + s.y});
+    }
+};
+
+/// Whether a seam's second use, laid next, would run along the first the same way, or back over it though their pcurves
+/// lie whole periods apart.
+bool doubles_seam(const Walk& walk, const Use& next, Vec2d shift)
+{
+    return next.edge->seam && std::any_of(walk.begin(), walk.end(), [&](const PlacedUse& placed) {
+               if (placed.use.edge->edge != next.edge->edge)
+                   return false;
+               const bool shifted = shift.x != placed.shift.x || shift.y != placed.shift.y;
+               return placed.use.backwards == next.backwards || (&placed == &walk.back() && shifted);
+           });
+}
+
+struct NextUse {
+    size_t index = 0;
+    bool turned = false;
+    double gap = std::numeric_limits<double>::infinity();
+};
+
+/// What follows a walk: the first of the uses left where it meets the walk's end, else the nearest.
+NextUse nearest_use(const Walk& walk, const std::vector<Use>& uses, const WalkEnd& end, bool seams_apart)
+{
+    NextUse best;
+    const auto consider = [&](size_t i, bool turned, double less_than) {
+        Use use = uses[i];
+        use.backwards = use.backwards != turned;
+        const double gap = end.gap(use);
+        if (gap < less_than && !(seams_apart && doubles_seam(walk, use, end.shift(use))))
+            best = {i, turned, gap};
+    };
+    consider(0, false, best.gap);
+    if (best.gap > end.near_mm)
+        for (size_t i = 0; i < uses.size(); ++i)
+            for (const bool turned : {false, true})
+                // the order and direction of the file stand unless another end is clearly nearer
+                consider(i, turned, 0.5 * best.gap);
+    return best;
+}
+
 /// Orders the uses of one loop. A loop whose ends meet before all uses are walked is closed, and another begins.
 std::vector<Walk> walk_loop(std::vector<Use> uses, const Joints& joints, double near_mm)
 {
@@ -116,33 +170,17 @@ std::vector<Walk> walk_loop(std::vector<Use> uses, const Joints& joints, double 
         Walk walk{{uses.front(), {0, 0}}};
         uses.erase(uses.begin());
         while (!uses.empty()) {
-            const PlacedUse& last = walk.back();
-            const Vec2d at{last.use.end().x + last.shift.x, last.use.end().y + last.shift.y};
-            const auto gap = [&](Vec2d start) {
-                const Vec2d s = joints.shift(at, start, last.shift, near_mm);
-                return joints.distance(at, {start.x + s.x, start.y + s.y});
-            };
-            size_t best = 0;
-            bool turned = false;
-            double best_gap = gap(uses[0].start());
-            if (best_gap > near_mm) {
-                for (size_t i = 0; i < uses.size(); ++i)
-                    for (const bool turn : {false, true}) {
-                        const double g = gap(turn ? uses[i].end() : uses[i].start());
-                        // the order and direction of the file stand unless another end is clearly nearer
-                        if (g < 0.5 * best_gap) {
-                            best = i;
-                            turned = turn;
-                            best_gap = g;
-                        }
-                    }
-                if (best_gap > near_mm && gap(walk.front().use.start()) <= near_mm)
+            const WalkEnd end{joints, walk.back(), near_mm};
+            NextUse best = nearest_use(walk, uses, end, true);
+            if (best.gap > near_mm) {
+                if (end.gap(walk.front().use) <= near_mm)
                     break;
+                best = nearest_use(walk, uses, end, false); // a cut into the face along its seam
             }
-            Use next = uses[best];
-            uses.erase(uses.begin() + static_cast<std::ptrdiff_t>(best));
-            next.backwards = next.backwards != turned;
-            walk.push_back({next, joints.shift(at, next.start(), last.shift, near_mm)});
+            Use next = uses[best.index];
+            uses.erase(uses.begin() + static_cast<std::ptrdiff_t>(best.index));
+            next.backwards = next.backwards != best.turned;
+            walk.push_back({next, end.shift(next)});
         }
         walks.push_back(std::move(walk));
     }

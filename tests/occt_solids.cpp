@@ -171,9 +171,15 @@ bool write_closed_face(ClosedFace kind, const std::string& path)
 {
     try {
         const bool sphere = kind == ClosedFace::Sphere || kind == ClosedFace::SphereSeamOnly;
-        const TopoDS_Shape solid = sphere ? BRepPrimAPI_MakeSphere(20).Shape() : BRepPrimAPI_MakeTorus(30, 8).Shape();
-        TopoDS_Face face = TopoDS::Face(TopExp_Explorer(solid, TopAbs_FACE).Current());
-        if (kind == ClosedFace::SphereSeamOnly || kind == ClosedFace::TorusSeamOnly) {
+        const TopoDS_Shape solid =
+            sphere ? BRepPrimAPI_MakeSphere(20).Shape()
+            : kind == ClosedFace::Cylinder
+                ? BRepPrimAPI_MakeCylinder(gp_Ax2(gp_Pnt(0, 0, -15), gp_Dir(0, 0, 1)), 20, 30).Shape()
+                : BRepPrimAPI_MakeTorus(30, 8).Shape();
+        TopoDS_Face face =
+            TopoDS::Face(TopExp_Explorer(solid, TopAbs_FACE).Current()); // the cylinder's wall, not a lid
+        if (kind == ClosedFace::SphereSeamOnly || kind == ClosedFace::TorusSeamAlongV ||
+            kind == ClosedFace::TorusSeamAlongU) {
             TopLoc_Location place;
             const Handle(Geom_Surface) surface = BRep_Tool::Surface(face, place);
             const BRep_Builder builder;
@@ -184,7 +190,7 @@ bool write_closed_face(ClosedFace kind, const std::string& path)
                 double first = 0, last = 0;
                 const Handle(Geom2d_Curve) pcurve = BRep_Tool::CurveOnSurface(edge, face, first, last);
                 const bool along_v = std::abs(pcurve->Value(first).X() - pcurve->Value(last).X()) < 1e-9;
-                if (along_v && !BRep_Tool::Degenerated(edge))
+                if (along_v != (kind == ClosedFace::TorusSeamAlongU) && !BRep_Tool::Degenerated(edge))
                     builder.Add(wire, edge);
             }
             builder.MakeFace(face, surface, place, 1e-7);

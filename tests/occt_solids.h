@@ -20,13 +20,15 @@ const char* solid_name(Solid solid);
 /// One solid, about 100 mm in size, along no axis. False: not made, or not valid and closed by the kernel's own check.
 bool write_closed_solid(Solid solid, const std::string& path);
 
-/// A closed surface that is a face of its own, about the origin, its axis z and its seam at +x: a sphere of radius 20,
-/// or a torus of radii 30 and 8.
+/// A surface that closes on itself, as a face of its own about the origin, its axis z and its seam at +x: a sphere of
+/// radius 20, a torus of radii 30 and 8, or a cylinder of radius 20 from z = -15 to 15.
 enum class ClosedFace {
     Sphere, // a loop of its seam and two poles
-    Torus,  // a loop of both its seams
     SphereSeamOnly,
-    TorusSeamOnly, // one of its seams; the other is in no loop
+    Torus,           // a loop of both its seams
+    TorusSeamAlongV, // a loop of the seam at constant u; the other is in no loop
+    TorusSeamAlongU, // the other way round
+    Cylinder,        // a loop of its seam and two circles
 };
 
 /// False: not made.

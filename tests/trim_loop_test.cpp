@@ -323,15 +323,70 @@ TEST(trim_loop, a_hole_alone_on_a_closed_surface_leaves_the_rest_of_it)
     }
 }
 
+CadFace torus_face(double radius, double minor_radius, std::vector<CadLoop> loops)
+{
+    CadFace face = plane_face(std::move(loops));
+    face.surface.kind = kKindTorus;
+    face.surface.radius = radius;
+    face.surface.minor_radius = minor_radius;
+    face.surface.period_u = face.surface.period_v = 2 * M_PI;
+    face.surface.natural_bounds = {{0, 0}, {2 * M_PI, 2 * M_PI}};
+    return face;
+}
+
+TEST(trim_loop, a_torus_with_one_of_its_seams_is_whole_however_many_edges_the_seam_has)
+{
+    const double p = 2 * M_PI;
+    for (const bool along_v : {true, false})
+        for (const int edges : {1, 2, 3})
+            for (int first = 0; first < 2 * edges; ++first) {
+                const auto at = [&](double across, double along) {
+                    return along_v ? Vec2d{across, along} : Vec2d{p - across, along};
+                };
+                const auto swapped = [&](Vec2d q) { return along_v ? q : Vec2d{q.y, q.x}; };
+                CadLoop loop; // up at the far end, down at the near one
+                for (int i = 0; i < edges; ++i)
+                    loop.push_back(
+                        use_of(line_curve(swapped(at(p, p * i / edges)), swapped(at(p, p * (i + 1) / edges)))));
+                for (int i = edges; i-- > 0;)
+                    loop.push_back(
+                        use_of(line_curve(swapped(at(0, p * i / edges)), swapped(at(0, p * (i + 1) / edges))), true));
+                std::rotate(loop.begin(), loop.begin() + first, loop.end());
+                CadFace face = torus_face(5, 1, {loop});
+                for (CadEdgeUse& use : face.loops[0]) {
+                    const auto& c = use.pcurve.control_points;
+                    const double along = along_v ? std::min(c[0][1], c[1][1]) : std::min(c[0][0], c[1][0]);
+                    use.seam = true;
+                    use.edge = static_cast<uint32_t>(std::lround(along * edges / p));
+                }
+                const auto whole = build_trim_loops(face, kNotGrown);
+                ASSERT_TRUE(whole.ok()) << along_v << " " << edges << " " << first;
+                EXPECT_TRUE(whole->natural_border) << along_v << " " << edges << " " << first;
+                EXPECT_TRUE(whole->findings.empty()) << along_v << " " << edges << " " << first;
+                EXPECT_NEAR(area_of(*whole), p * p, 1e-9);
+            }
+}
+
+TEST(trim_loop, a_cut_into_a_cylinder_along_its_seam_leaves_it_whole)
+{
+    const double p = 2 * M_PI;
+    CadFace face = cylinder_face(2, {{use_of(line_curve({0, 0}, {p, 0})), use_of(line_curve({p, 0}, {p, 1})),
+                                      use_of(line_curve({0, 0}, {0, 1}), true)},
+                                     {use_of(line_curve({p, 3}, {0, 3}))}});
+    for (const size_t i : {1, 2}) {
+        face.loops[0][i].seam = true;
+        face.loops[0][i].edge = 7;
+    }
+    const auto loops = build_trim_loops(face, kNotGrown);
+    ASSERT_TRUE(loops.ok()) << loops.error().detail;
+    EXPECT_FALSE(loops->had_open_loop);
+    EXPECT_NEAR(area_of(*loops), 3 * p, 1e-6);
+}
+
 TEST(trim_loop, a_band_around_a_torus_lies_on_the_side_its_circles_say)
 {
     const double p = 2 * M_PI;
-    CadFace face = plane_face({{use_of(line_curve({0, 1}, {p, 1}))}, {use_of(line_curve({p, 2.5}, {0, 2.5}))}});
-    face.surface.kind = kKindTorus;
-    face.surface.radius = 5;
-    face.surface.minor_radius = 1;
-    face.surface.period_u = face.surface.period_v = p;
-    face.surface.natural_bounds = {{0, 0}, {p, p}};
+    CadFace face = torus_face(5, 1, {{use_of(line_curve({0, 1}, {p, 1}))}, {use_of(line_curve({p, 2.5}, {0, 2.5}))}});
     const auto inner = build_trim_loops(face, kNotGrown);
     ASSERT_TRUE(inner.ok());
     EXPECT_NEAR(area_of(*inner), p * 1.5, 1e-9);
@@ -351,12 +406,7 @@ TEST(trim_loop, the_inner_sheet_of_a_spindle_torus_between_its_poles_is_its_doma
 {
     // R + r cos v = 0 at both ends: the circles there have no length, the widest one lies between
     const double lo = 2 * M_PI / 3, hi = 4 * M_PI / 3;
-    CadFace face = plane_face({polygon_loop({{M_PI, lo}, {2 * M_PI, lo}, {2 * M_PI, hi}, {M_PI, hi}})});
-    face.surface.kind = kKindTorus;
-    face.surface.radius = 1;
-    face.surface.minor_radius = 2;
-    face.surface.period_u = face.surface.period_v = 2 * M_PI;
-    face.surface.natural_bounds = {{0, 0}, {2 * M_PI, 2 * M_PI}};
+    const CadFace face = torus_face(1, 2, {polygon_loop({{M_PI, lo}, {2 * M_PI, lo}, {2 * M_PI, hi}, {M_PI, hi}})});
     const Result<TrimLoops> loops = build_trim_loops(face, kNotGrown);
     ASSERT_TRUE(loops.ok()) << loops.error().detail;
     EXPECT_TRUE(loops->natural_border);
