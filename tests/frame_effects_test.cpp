@@ -239,6 +239,32 @@ TEST(frame_effects, change_colours_alone_and_cost_nothing_unasked)
     EXPECT_EQ(draw(scene, options).stats.work.edge_tests, 0u) << "without colours there is nothing to draw";
 }
 
+TEST(frame_effects, lines_are_the_same_bits_in_every_mode_that_asks_the_pieces)
+{
+    const auto scene = all_kinds().finish();
+    RenderOptions options;
+    options.width = 157;
+    options.height = 93;
+    options.camera = {{18, -26, 19}, {0, 0, 0}, {0, 0, 1}, 40};
+    for (const EdgeLines edges : {EdgeLines::Sharp, EdgeLines::All})
+        for (const bool fill : {true, false}) {
+            options.edges = edges;
+            options.fill = fill;
+            options.trim = TrimMode::Exact;
+            const Drawn exact = draw(scene, options);
+            EXPECT_GT(exact.stats.work.edge_tests, 0u);
+            for (const TrimMode mode : {TrimMode::Kd, TrimMode::Hybrid, TrimMode::Reference}) {
+                options.trim = mode;
+                const Drawn drawn = draw(scene, options);
+                EXPECT_EQ(drawn.stats.trim, mode);
+                EXPECT_EQ(drawn.stats.work.edge_tests, exact.stats.work.edge_tests) << int(mode);
+                EXPECT_TRUE(same_bits(drawn.frame.rgba, exact.frame.rgba)) << int(mode);
+            }
+            options.trim = TrimMode::Sdf; // its borders are the textures'
+            EXPECT_FALSE(same_bits(draw(scene, options).frame.rgba, exact.frame.rgba));
+        }
+}
+
 TEST(frame_effects, give_the_same_bits_on_every_instruction_set_and_any_number_of_threads)
 {
     const auto scene = all_kinds().finish();

@@ -189,6 +189,33 @@ TEST_F(vk_tracer, hybrid_trims_answer_as_exact_ones)
     EXPECT_LT(hybrid_stats.work.curve_tests, exact_stats.work.curve_tests);
 }
 
+TEST_F(vk_tracer, lines_are_the_same_in_every_mode_that_asks_the_pieces)
+{
+    const auto scene = trimmed_planes().finish();
+    const auto tracer = make(scene);
+    ASSERT_TRUE(tracer);
+    RenderOptions options = small_picture({8, -16, 20});
+    const Frame plain = render(*tracer, options);
+    options.edges = EdgeLines::Sharp;
+    RenderStats exact_stats;
+    const Frame exact = render(*tracer, options, &exact_stats);
+    EXPECT_EQ(exact_stats.trim, TrimMode::Exact);
+    EXPECT_GT(exact_stats.work.edge_tests, 0u);
+    EXPECT_NE(exact.rgba, plain.rgba);
+    for (const TrimMode mode : {TrimMode::Kd, TrimMode::Hybrid}) {
+        options.trim = mode;
+        RenderStats stats;
+        const Frame drawn = render(*tracer, options, &stats);
+        EXPECT_EQ(stats.trim, mode);
+        EXPECT_EQ(stats.work.edge_tests, exact_stats.work.edge_tests);
+        ASSERT_EQ(drawn.face, exact.face);
+        float most = 0;
+        for (size_t i = 0; i < exact.rgba.size(); ++i)
+            most = std::max(most, std::abs(drawn.rgba[i] - exact.rgba[i]));
+        EXPECT_LE(most, 0.02f) << "steps of 1/256 pixel, and what they do to a colour";
+    }
+}
+
 TEST_F(vk_tracer, draws_what_the_cpu_tracer_draws)
 {
     TracedScene builder = all_kinds();
