@@ -204,6 +204,7 @@ Result<TrimView> measure_view(const std::string& name, const Camera& camera, con
             const auto [seconds, wrong] = queries.run(*contestant.scene->prepared, contestant.setting.mode);
             times[i].query_seconds = std::min(times[i].query_seconds, seconds);
             view.figures[i].wrong_queries = wrong;
+            view.figures[i].bytes = trim_bytes(contestant) + stats.border_bytes;
             if (round == 0)
                 view.figures[i].errors = trim_errors(contestant.scene->pack.image, reference, rays, *frame, *right);
             if (contestant.setting.edges) // the reference's picture has none
@@ -213,7 +214,6 @@ Result<TrimView> measure_view(const std::string& name, const Camera& camera, con
     for (size_t i = 0; i < count; ++i) {
         TrimFigures& figures = view.figures[i];
         figures.setting = contestants[i].setting;
-        figures.bytes = trim_bytes(contestants[i]);
         figures.frame_ms = median(times[i].frame_ms);
         figures.speed_to_kd = speed_to_kd(times[0], times[i]);
         figures.queries = queries.asked();

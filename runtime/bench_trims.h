@@ -28,7 +28,7 @@ std::vector<TrimSetting> trim_settings(const std::vector<double>& memories);
 
 struct TrimFigures {
     TrimSetting setting;
-    uint64_t bytes = 0;     // of what the mode reads: trees, pieces and cells, textures
+    uint64_t bytes = 0;     // of what the mode reads: trees, pieces and cells, textures, with edges the borders' cells
     double frame_ms = 0;    // median; on one thread its processor time
     double speed_to_kd = 0; // median over the rounds of kd's time over this one's
     double ns_per_query = 0;

@@ -16,6 +16,8 @@ namespace trimray {
 struct BorderCells {
     std::vector<uint32_t> words;
     std::vector<uint8_t> classes; // by face: bits kEdge... of its borders, of natural ones too
+
+    size_t size_bytes() const { return words.size() * sizeof(uint32_t) + classes.size(); }
 };
 
 /// Domain: a validated image. Cells are about square on the surface, about two a piece.

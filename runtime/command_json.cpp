@@ -32,8 +32,15 @@ MemoryBytes memory_bytes(const PackImage& image)
 
 Json to_json(const MemoryBytes& bytes)
 {
-    return {{"geometry", bytes.geometry}, {"bvh", bytes.bvh},         {"trim_exact", bytes.trim_exact},
-            {"trim_sdf", bytes.trim_sdf}, {"trim_kd", bytes.trim_kd}, {"total", bytes.total()}};
+    Json json = {{"geometry", bytes.geometry},
+                 {"bvh", bytes.bvh},
+                 {"trim_exact", bytes.trim_exact},
+                 {"trim_sdf", bytes.trim_sdf},
+                 {"trim_kd", bytes.trim_kd}};
+    if (bytes.borders > 0)
+        json["borders"] = bytes.borders;
+    json["total"] = bytes.total();
+    return json;
 }
 
 const std::string& string_at(const PackImage& image, uint index)

@@ -17,13 +17,15 @@ using Json = nlohmann::ordered_json;
 void print_json(const Json& object);
 
 /// Bytes a scene's arrays take in memory. geometry: parts, placements, faces, patches, control points; bvh: leaves and
-/// nodes; trim_exact: pieces and cells; trim_sdf: distance textures; trim_kd: 0, for the
-/// trees are no part of a pack; render reports those that it built.
+/// nodes; trim_exact: pieces and cells; trim_sdf: distance textures; trim_kd and
+/// borders (the cells that lines and smoothed trims are looked up in): 0, for they are no part of a pack; render
+/// reports those that it built.
 struct MemoryBytes {
-    uint64_t geometry = 0, bvh = 0, trim_exact = 0, trim_sdf = 0, trim_kd = 0;
-    uint64_t total() const { return geometry + bvh + trim_exact + trim_sdf + trim_kd; }
+    uint64_t geometry = 0, bvh = 0, trim_exact = 0, trim_sdf = 0, trim_kd = 0, borders = 0;
+    uint64_t total() const { return geometry + bvh + trim_exact + trim_sdf + trim_kd + borders; }
 };
 MemoryBytes memory_bytes(const PackImage& image);
+/// The key "borders" is there only where they are.
 Json to_json(const MemoryBytes& bytes);
 
 /// The text at `index` of the pack's strings.

@@ -76,6 +76,7 @@ Json report_json(const RenderArguments& arguments, PictureSize size, const PackI
     report["rays_per_second"] = static_cast<double>(work.rays) / (median * 1e-3);
     MemoryBytes bytes = memory_bytes(image);
     bytes.trim_kd = stats.kd_bytes;
+    bytes.borders = stats.border_bytes;
     report["bytes"] = to_json(bytes);
     report["effects"] = Json::array();
     RenderOptions traced = options;

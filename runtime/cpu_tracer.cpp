@@ -75,13 +75,15 @@ public:
             return trim.error();
         if (const Status drawable = check_effects(options); !drawable.ok())
             return drawable.error();
-        if (edge_query(options).any() && has_effects(options) && !border_cells_)
+        const bool asks_borders = edge_query(options).any() && has_effects(options);
+        if (asks_borders && !border_cells_)
             border_cells_ = make_border_cells(scene_->pack.image);
         if (*trim == TrimMode::Kd && !cpu_scene_->kd_trims().ok())
             return cpu_scene_->kd_trims().error();
         stats.device = name_;
         stats.trim = *trim;
         stats.kd_bytes = *trim == TrimMode::Kd ? cpu_scene_->kd_trims()->size_bytes() : 0;
+        stats.border_bytes = asks_borders ? border_cells_->size_bytes() : 0;
         stats.frame_ms.clear();
         stats.frame_cpu_ms.clear();
         stats.trim_queries.clear();

@@ -94,6 +94,7 @@ struct RenderStats {
     WorkCounts work; // of one frame
     TrimMode trim = TrimMode::Exact;
     uint64_t kd_bytes = 0;                 // of the kd-trees, in the mode kd; otherwise there are none
+    uint64_t border_bytes = 0;             // of the borders' cells, where lines or smoothed trims ask for them; else 0
     std::vector<TrimQueries> trim_queries; // of one frame, if asked for; on one thread in the order in which they came
 };
 

@@ -525,6 +525,7 @@ Result<Frame> VulkanTracer::render(const RenderOptions& options, RenderStats& st
     stats.device = device_->name();
     stats.trim = *trim;
     stats.kd_bytes = *trim == TrimMode::Kd ? kd_bytes_ : 0;
+    stats.border_bytes = edges_wanted_ ? buffers_[kBindBorders].size_bytes() : 0;
     for (uint32_t i = 0; i < frames; ++i) {
         // a software driver's frames are always read: only that shows what must be traced again
         const bool read = i + 1 == frames || device_->is_software() || has_effects(options);

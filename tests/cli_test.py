@@ -360,6 +360,8 @@ class Render(CliTest):
             report = self.json_of("render", PACK, "-o", WORK / (name + ".png"), *small, *options)
             self.assertEqual(report["effects"][report["effects"].index("shading") + 1:], effects)
             self.assertEqual("edge_tests" in report["work"], name != "plain")
+            self.assertEqual("borders" in report["bytes"], name != "plain")
+            self.assertEqual(sum(report["bytes"].values()), 2 * report["bytes"]["total"])
             drawn[name] = read_png(WORK / (name + ".png"))[2]
         self.assertEqual(len({str(rows) for rows in drawn.values()}), len(drawn))
         for option, value, said in [("--edges", "shap", "'sharp'"), ("--style", "edges", "edges-only"),
@@ -509,6 +511,7 @@ class Bench(CliTest):
                              {(s, l, m) for s in ["curve", "mask"] for l in ["isotropic", "square"] for m in [100, 400]})
             self.assertEqual([i for i, row in enumerate(settings) if row["edges"]], [2])
             self.assertEqual(settings[0]["speed_to_kd"], 1)
+            self.assertGreater(settings[2]["bytes"], settings[1]["bytes"], "the borders' cells")
             for row in settings:
                 self.assertGreater(row["frame_ms"], 0)
                 self.assertGreater(row["ns_per_query"], 0)
