@@ -1,6 +1,5 @@
 #include "preprocess/trim_check.h"
 
-#include "format/trim_piece.h"
 #include "preprocess/trim_chain.h"
 
 #include <fmt/format.h>
@@ -12,17 +11,6 @@
 
 namespace trimray {
 namespace {
-
-MonotonePiece monotone(const CurvePiece& piece)
-{
-    MonotonePiece m;
-    m.cubic = piece.cubic;
-    for (int i = 0; i < 4; ++i) {
-        m.u[i] = piece.p[i].x;
-        m.v[i] = piece.p[i].y;
-    }
-    return m;
-}
 
 /// A piece that is compared with others.
 struct Piece {

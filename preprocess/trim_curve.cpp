@@ -1,5 +1,7 @@
 #include "preprocess/trim_curve.h"
 
+#include "preprocess/vec2d.h"
+
 #include <algorithm>
 #include <array>
 #include <cassert>
@@ -14,27 +16,6 @@ constexpr double kTurnShare = 0.2;
 constexpr double kFitShare = 0.9;
 // What a piece costs in the pack: its points beyond the shared one, and its word.
 constexpr double kLineBytes = 12, kCubicBytes = 28;
-
-Vec2d operator+(Vec2d a, Vec2d b)
-{
-    return {a.x + b.x, a.y + b.y};
-}
-Vec2d operator-(Vec2d a, Vec2d b)
-{
-    return {a.x - b.x, a.y - b.y};
-}
-Vec2d operator*(double s, Vec2d a)
-{
-    return {s * a.x, s * a.y};
-}
-double dot(Vec2d a, Vec2d b)
-{
-    return a.x * b.x + a.y * b.y;
-}
-double length(Vec2d a)
-{
-    return std::sqrt(dot(a, a)); // in mm of a model: no overflow to guard against
-}
 
 struct PointAndSlope {
     Vec2d p, d;
@@ -538,6 +519,17 @@ bool is_finite(const std::vector<Node>& nodes)
 }
 
 } // namespace
+
+MonotonePiece monotone(const CurvePiece& piece)
+{
+    MonotonePiece m;
+    m.cubic = piece.cubic;
+    for (int i = 0; i < 4; ++i) {
+        m.u[i] = piece.p[i].x;
+        m.v[i] = piece.p[i].y;
+    }
+    return m;
+}
 
 void order_points(CurvePiece& piece)
 {

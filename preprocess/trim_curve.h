@@ -2,6 +2,7 @@
 // stand for the curve, cut where it turns, then the longest stretches that one line or one cubic fits.
 #pragma once
 
+#include "format/trim_piece.h"
 #include "preprocess/cad_model.h"
 
 #include <vector>
@@ -22,6 +23,9 @@ struct CurvePiece {
     int use = kNoUse;       // the edge use that it comes from, counted over the face's loops in order
     double grow_mm = kHeld; // what it is moved outwards by, less rounding (trim_grow.h)
 };
+
+/// The piece as the pack's functions take one, in the coordinates that it is in.
+MonotonePiece monotone(const CurvePiece& piece);
 
 /// Puts the inner points of a cubic in order between its ends, in u and in v; where they were, nothing changes.
 void order_points(CurvePiece& piece);

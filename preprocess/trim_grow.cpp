@@ -1,8 +1,8 @@
 #include "preprocess/trim_grow.h"
 
-#include "format/trim_piece.h"
 #include "preprocess/bezier_patch.h"
 #include "preprocess/spline.h"
+#include "preprocess/vec2d.h"
 #include "preprocess/vec3d.h"
 
 #include <algorithm>
@@ -29,42 +29,6 @@ constexpr double kConvexReach = 2, kNotchReach = kGrowReach;
 constexpr double kLeastSpeed = 0.2;
 // Directions nearer to each other (sine of their angle) are one.
 constexpr double kSameDirection = 0.05;
-
-Vec2d operator+(Vec2d a, Vec2d b)
-{
-    return {a.x + b.x, a.y + b.y};
-}
-Vec2d operator-(Vec2d a, Vec2d b)
-{
-    return {a.x - b.x, a.y - b.y};
-}
-Vec2d operator*(double s, Vec2d a)
-{
-    return {s * a.x, s * a.y};
-}
-double dot(Vec2d a, Vec2d b)
-{
-    return a.x * b.x + a.y * b.y;
-}
-double cross(Vec2d a, Vec2d b)
-{
-    return a.x * b.y - a.y * b.x;
-}
-double length(Vec2d a)
-{
-    return std::hypot(a.x, a.y);
-}
-
-MonotonePiece monotone(const CurvePiece& piece)
-{
-    MonotonePiece m;
-    m.cubic = piece.cubic;
-    for (int i = 0; i < 4; ++i) {
-        m.u[i] = piece.p[i].x;
-        m.v[i] = piece.p[i].y;
-    }
-    return m;
-}
 
 /// Which side of a loop is inside: left of its pieces' direction, right, or now one and now the other.
 enum class Inside { Left, Right, Mixed };
