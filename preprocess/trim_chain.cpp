@@ -1,5 +1,8 @@
 #include "preprocess/trim_chain.h"
 
+#include "preprocess/trim_corner.h"
+#include "preprocess/vec2d.h"
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -187,57 +190,37 @@ std::vector<Walk> walk_loop(std::vector<Use> uses, const Joints& joints, double 
     return walks;
 }
 
-void reverse_pieces(std::vector<CurvePiece>& pieces)
-{
-    std::reverse(pieces.begin(), pieces.end());
-    for (CurvePiece& piece : pieces) {
-        std::swap(piece.p[0], piece.p[3]);
-        std::swap(piece.p[1], piece.p[2]);
-    }
-}
-
-CurvePiece line_piece(Vec2d a, Vec2d b)
-{
-    const auto mix = [&](double t) { return Vec2d{a.x + t * (b.x - a.x), a.y + t * (b.y - a.y)}; };
-    return {{a, mix(1 / 3.0), mix(2 / 3.0), b}, false};
-}
-
 // Neighbouring pcurves that miss each other by up to this many tolerances are moved together by half the gap each: as
 // far as the file contradicts itself, and no farther. What they move counts as deviation.
 constexpr double kJoinTolerances = 10;
 
-/// Joins the end of `before` with the start of `after`, which is `offset` (whole periods) away in uv. Returns true, and
-/// the line, if the gap needs one.
-bool join(CurvePiece& before, CurvePiece& after, Vec2d offset, const CadFace& face, const Joints& joints,
-          const TrimMetric& metric, ChainReport& report, CurvePiece& filler)
+/// Joins the end of `before` with the start of `after`, which is `offset` (whole periods) away in uv. What the gap
+/// needs between them is put into `between`.
+void join(CurvePiece& before, CurvePiece& after, Vec2d offset, const CadFace& face, const Joints& joints,
+          const TrimMetric& metric, ChainReport& report, std::vector<CurvePiece>& between)
 {
-    const Vec2d a = before.p[3], b{after.p[0].x + offset.x, after.p[0].y + offset.y};
+    const Vec2d a = before.p[3], b = after.p[0] + offset, gap = b - a;
     if (a.x == b.x && a.y == b.y)
-        return false;
-    const double flat_mm = std::hypot((a.x - b.x) * metric.mm_per_uv.x, (a.y - b.y) * metric.mm_per_uv.y);
+        return;
+    const double flat_mm = length({gap.x * metric.mm_per_uv.x, gap.y * metric.mm_per_uv.y});
     const double gap_mm = joints.distance(a, b);
     report.largest_gap_mm = std::max(report.largest_gap_mm, gap_mm);
-    if (flat_mm > kJoinTolerances * metric.tolerance_mm) {
-        filler = line_piece(a, b);
-        filler.grow_mm = std::max({before.grow_mm, after.grow_mm, 0.0}); // the corner is its neighbours'
-        if (gap_mm > std::max(face.tolerance_mm, kJoinTolerances * metric.tolerance_mm)) {
-            report.had_open_loop = true;
-            report.findings.push_back({TrimFindingKind::OpenLoop, a, gap_mm, report.loop, report.loop});
-        }
-        return true;
+    if (flat_mm <= kJoinTolerances * metric.tolerance_mm) {
+        report.largest_move_mm = std::max(report.largest_move_mm, 0.5 * flat_mm);
+        move_end(before, a + 0.5 * gap, metric.mm_per_uv);
+        move_start(after, before.p[3] - offset, metric.mm_per_uv);
+        return;
     }
-    report.largest_move_mm = std::max(report.largest_move_mm, 0.5 * flat_mm);
-    for (CurvePiece* piece : {&before, &after})
-        if (piece->grow_mm != kHeld)
-            piece->grow_mm += 0.5 * flat_mm;
-    const Vec2d half{0.5 * (b.x - a.x), 0.5 * (b.y - a.y)};
-    before.p[2] = {before.p[2].x + half.x, before.p[2].y + half.y};
-    before.p[3] = {a.x + half.x, a.y + half.y};
-    after.p[0] = {before.p[3].x - offset.x, before.p[3].y - offset.y};
-    after.p[1] = {after.p[1].x - half.x, after.p[1].y - half.y};
-    order_points(before);
-    order_points(after);
-    return false;
+    const bool open = gap_mm > std::max(face.tolerance_mm, kJoinTolerances * metric.tolerance_mm);
+    if (open) {
+        report.had_open_loop = true;
+        report.findings.push_back({TrimFindingKind::OpenLoop, a, gap_mm, report.loop, report.loop});
+    }
+    if (!open && meet_at_corner(before, after, offset, metric.mm_per_uv, between))
+        return;
+    CurvePiece line = line_piece(a, b);
+    line.grow_mm = std::max({before.grow_mm, after.grow_mm, 0.0}); // the corner is its neighbours'
+    between.push_back(line);
 }
 
 void grow(Rect2d& r, Vec2d p)
@@ -416,10 +399,10 @@ std::vector<TrimChain> build_chains(const CadFace& face, double relative_toleran
                 for (Vec2d& p : piece.p)
                     p = {p.x + placed.shift.x, p.y + placed.shift.y};
             }
-            CurvePiece filler;
-            if (!chain.pieces.empty() &&
-                join(chain.pieces.back(), fit.pieces.front(), {0, 0}, face, joints, metric, report, filler))
-                chain.pieces.push_back(filler);
+            std::vector<CurvePiece> between;
+            if (!chain.pieces.empty())
+                join(chain.pieces.back(), fit.pieces.front(), {0, 0}, face, joints, metric, report, between);
+            chain.pieces.insert(chain.pieces.end(), between.begin(), between.end());
             chain.pieces.insert(chain.pieces.end(), fit.pieces.begin(), fit.pieces.end());
         }
         const Vec2d end = chain.pieces.back().p[3], start = chain.pieces.front().p[0];
@@ -428,9 +411,9 @@ std::vector<TrimChain> build_chains(const CadFace& face, double relative_toleran
             chain.winding_u = static_cast<int>(std::lround(offset.x / face.surface.period_u));
         if (offset.y != 0)
             chain.winding_v = static_cast<int>(std::lround(offset.y / face.surface.period_v));
-        CurvePiece filler;
-        if (join(chain.pieces.back(), chain.pieces.front(), offset, face, joints, metric, report, filler))
-            chain.pieces.push_back(filler);
+        std::vector<CurvePiece> between;
+        join(chain.pieces.back(), chain.pieces.front(), offset, face, joints, metric, report, between);
+        chain.pieces.insert(chain.pieces.end(), between.begin(), between.end());
         chains.push_back(std::move(chain));
     }
     return chains;

@@ -14,6 +14,8 @@ namespace {
 constexpr double kSamplingShare = 0.1;
 constexpr double kTurnShare = 0.2;
 constexpr double kFitShare = 0.9;
+// Control points of a piece nearer than this, in uv, give no direction.
+constexpr double kOnePoint = 1e-12;
 // What a piece costs in the pack: its points beyond the shared one, and its word.
 constexpr double kLineBytes = 12, kCubicBytes = 28;
 
@@ -531,6 +533,68 @@ MonotonePiece monotone(const CurvePiece& piece)
     return m;
 }
 
+CurvePiece line_piece(Vec2d a, Vec2d b)
+{
+    return {{a, a + (1 / 3.0) * (b - a), a + (2 / 3.0) * (b - a), b}, false};
+}
+
+void reverse_pieces(std::vector<CurvePiece>& pieces)
+{
+    std::reverse(pieces.begin(), pieces.end());
+    for (CurvePiece& piece : pieces) {
+        std::swap(piece.p[0], piece.p[3]);
+        std::swap(piece.p[1], piece.p[2]);
+    }
+}
+
+Vec2d start_direction(const CurvePiece& piece)
+{
+    for (const int i : {1, 2, 3})
+        if (const Vec2d d = piece.p[i] - piece.p[0]; piece.cubic ? length(d) > kOnePoint : i == 3)
+            return d;
+    return {};
+}
+
+Vec2d end_direction(const CurvePiece& piece)
+{
+    for (const int i : {2, 1, 0})
+        if (const Vec2d d = piece.p[3] - piece.p[i]; piece.cubic ? length(d) > kOnePoint : i == 0)
+            return d;
+    return {};
+}
+
+namespace {
+
+void move_by(CurvePiece& piece, int end, int beside, Vec2d by, Vec2d mm_per_uv)
+{
+    piece.p[end] = piece.p[end] + by;
+    piece.p[beside] = piece.p[beside] + by;
+    if (piece.grow_mm != kHeld)
+        piece.grow_mm += length({by.x * mm_per_uv.x, by.y * mm_per_uv.y});
+    order_points(piece);
+}
+
+} // namespace
+
+void move_start(CurvePiece& piece, Vec2d to, Vec2d mm_per_uv)
+{
+    move_by(piece, 0, 1, to - piece.p[0], mm_per_uv);
+    piece.p[0] = to;
+}
+
+void move_end(CurvePiece& piece, Vec2d to, Vec2d mm_per_uv)
+{
+    move_by(piece, 3, 2, to - piece.p[3], mm_per_uv);
+    piece.p[3] = to;
+}
+
+double parameter_at(const CurvePiece& piece, bool v, double x)
+{
+    const MonotonePiece m = monotone(piece);
+    const double* c = v ? m.v : m.u;
+    return piece.cubic ? solve_monotone(c, x) : (x - c[0]) / (c[3] - c[0]);
+}
+
 void order_points(CurvePiece& piece)
 {
     if (!piece.cubic)
@@ -571,7 +635,7 @@ CurveFit fit_curve(const SplineCurve2d& curve, double first, double last, Vec2d 
         const Vec2d a = curve_point(curve, first), b = curve_point(curve, last);
         fit.finite = std::isfinite(a.x) && std::isfinite(a.y) && std::isfinite(b.x) && std::isfinite(b.y);
         if (fit.finite)
-            fit.pieces.push_back({{a, a + (1 / 3.0) * (b - a), a + (2 / 3.0) * (b - a), b}, false});
+            fit.pieces.push_back(line_piece(a, b));
         return fit;
     }
     const std::vector<Node> nodes = Sampler(curve, metric, kSamplingShare * tolerance).run(first, last);

@@ -24,6 +24,29 @@ struct CurvePiece {
     double grow_mm = kHeld; // what it is moved outwards by, less rounding (trim_grow.h)
 };
 
+// Tangents are one direction if the sine of the angle between them is less.
+inline constexpr double kSameDirection = 0.05;
+
+/// A line between two points, of no use.
+CurvePiece line_piece(Vec2d a, Vec2d b);
+
+/// Turns the way along the pieces round.
+void reverse_pieces(std::vector<CurvePiece>& pieces);
+
+/// The way that a piece leaves its start, or reaches its end: to the next point of its control polygon that is another.
+/// 0 for a piece without length.
+Vec2d start_direction(const CurvePiece& piece);
+Vec2d end_direction(const CurvePiece& piece);
+
+/// Moves an end, and the control point beside it. The move, in mm, is added to what the piece grows by, unless it is
+/// held.
+void move_start(CurvePiece& piece, Vec2d to, Vec2d mm_per_uv);
+void move_end(CurvePiece& piece, Vec2d to, Vec2d mm_per_uv);
+
+/// Parameter of the point whose u (`v`: whose v) is x; of a piece along which that coordinate changes.
+/// Outside of the piece: a cubic's end, a line's parameter beyond it.
+double parameter_at(const CurvePiece& piece, bool v, double x);
+
 /// The piece as the pack's functions take one, in the coordinates that it is in.
 MonotonePiece monotone(const CurvePiece& piece);
 

@@ -27,8 +27,6 @@ constexpr double kConvexReach = 2, kNotchReach = kGrowReach;
 // Where a surface collapses in a direction (a pole), lengths are taken as this share of their mean: a line to the pole
 // moves as a whole, and would lie far out at its other end. Both neighbours grow by the whole gap, so half is enough.
 constexpr double kLeastSpeed = 0.2;
-// Directions nearer to each other (sine of their angle) are one.
-constexpr double kSameDirection = 0.05;
 
 /// Which side of a loop is inside: left of its pieces' direction, right, or now one and now the other.
 enum class Inside { Left, Right, Mixed };
@@ -162,6 +160,11 @@ Move shortest_move(const Demand& a, const Demand& b, double reach)
             return {d};
         if (const Vec2d d = b.c * b.n; dot(a.n, d) >= a.c)
             return {d};
+        // One direction, but for rounding: where both lines meet is anywhere along them, or nowhere
+        if (std::abs(turn) < kSameDirection && dot(a.n, b.n) > 0) {
+            const Vec2d middle = a.n + b.n;
+            return {(std::max(a.c, b.c) / std::min(dot(middle, a.n), dot(middle, b.n))) * middle};
+        }
     }
     const double limit = reach * std::max(a.c, b.c);
     // n_a . d = c_a, n_b . d = c_b
@@ -170,21 +173,6 @@ Move shortest_move(const Demand& a, const Demand& b, double reach)
     if (!(far > limit))
         return {d};
     return {std::isfinite(far) ? (limit / far) * d : Vec2d{}, true};
-}
-
-Vec2d start_direction(const CurvePiece& piece)
-{
-    for (const int i : {1, 2, 3})
-        if (const Vec2d d = piece.p[i] - piece.p[0]; piece.cubic ? length(d) > 1e-12 : i == 3)
-            return d;
-    return {};
-}
-Vec2d end_direction(const CurvePiece& piece)
-{
-    for (const int i : {2, 1, 0})
-        if (const Vec2d d = piece.p[3] - piece.p[i]; piece.cubic ? length(d) > 1e-12 : i == 0)
-            return d;
-    return {};
 }
 
 /// The sides of the domain move as wholes, so that what runs along them still does.

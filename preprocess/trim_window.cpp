@@ -27,36 +27,11 @@ struct Axis {
     double scale(const TrimMetric& m) const { return v ? m.mm_per_uv.y : m.mm_per_uv.x; }
 };
 
-CurvePiece line_piece(Vec2d a, Vec2d b)
-{
-    const auto mix = [&](double t) { return Vec2d{a.x + t * (b.x - a.x), a.y + t * (b.y - a.y)}; };
-    return {{a, mix(1 / 3.0), mix(2 / 3.0), b}, false};
-}
-
 void shift_pieces(Pieces& pieces, Vec2d by)
 {
     for (CurvePiece& piece : pieces)
         for (Vec2d& p : piece.p)
             p = {p.x + by.x, p.y + by.y};
-}
-
-void reverse_pieces(Pieces& pieces)
-{
-    std::reverse(pieces.begin(), pieces.end());
-    for (CurvePiece& piece : pieces) {
-        std::swap(piece.p[0], piece.p[3]);
-        std::swap(piece.p[1], piece.p[2]);
-    }
-}
-
-/// Parameter of a piece, monotone in the axis, where its coordinate is x.
-double solve_at(const CurvePiece& piece, Axis axis, double x)
-{
-    const double c[4] = {axis.along(piece.p[0]), axis.along(piece.p[1]), axis.along(piece.p[2]),
-                         axis.along(piece.p[3])};
-    if (!piece.cubic)
-        return (x - c[0]) / (c[3] - c[0]);
-    return solve_monotone(c, x);
 }
 
 /// Cuts where a piece passes x strictly inside; both halves end at x exactly.
@@ -70,7 +45,7 @@ void cut_at(Pieces& pieces, Axis axis, double x)
             continue;
         }
         CurvePiece before, after;
-        split_piece(piece, std::clamp(solve_at(piece, axis, x), 0.0, 1.0), before, after);
+        split_piece(piece, std::clamp(parameter_at(piece, axis.v, x), 0.0, 1.0), before, after);
         axis.along(before.p[3]) = x;
         axis.along(after.p[0]) = x;
         order_points(before);
