@@ -211,7 +211,8 @@ void join(CurvePiece& before, CurvePiece& after, Vec2d offset, const CadFace& fa
         move_start(after, before.p[3] - offset, metric.mm_per_uv);
         return;
     }
-    const bool open = gap_mm > std::max(face.tolerance_mm, kJoinTolerances * metric.tolerance_mm);
+    // either end may be off by the tolerance from where they should meet
+    const bool open = gap_mm > std::max(2 * face.tolerance_mm, kJoinTolerances * metric.tolerance_mm);
     if (open) {
         report.had_open_loop = true;
         report.findings.push_back({TrimFindingKind::OpenLoop, a, gap_mm, report.loop, report.loop});

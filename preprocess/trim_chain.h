@@ -37,10 +37,11 @@ struct ChainReport {
 TrimMetric trim_metric(const CadSurface& surface, const Rect2d& domain, double relative_tolerance);
 
 /// Fits the pcurves of a face's loops and joins them.
-/// Ends that nearly meet are moved together; a wider gap is closed by a line, and counts as open when it is wider on
-/// the surface than the face's own tolerance (a gap along a pole is no gap). Uses follow each other in the order given
-/// where they meet; otherwise the nearest end goes next, turned around if need be. The two uses
-/// of a seam stay whole periods apart where the loop closes that way.
+/// Ends that nearly meet are moved together. Ends within twice the face's own tolerance (each may be off by it; on the
+/// surface: a gap along a pole is no gap) meet where their tangents cross nearby (trim_corner.h). What is left is
+/// closed by a line, and counts as open where it is wider than that. Uses follow each other in the order given where
+/// they meet; otherwise the nearest end goes next, turned around if need be. The two uses of a seam stay whole periods
+/// apart where the loop closes that way.
 std::vector<TrimChain> build_chains(const CadFace& face, double relative_tolerance, TrimMetric& metric,
                                     ChainReport& report);
 
