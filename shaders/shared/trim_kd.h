@@ -10,7 +10,7 @@
 #endif
 
 #include "format/kd_layout.h"
-#include "shaders/shared/language.h"
+#include "shaders/shared/monotone_side.h"
 
 SHARED_OPEN
 
@@ -80,43 +80,21 @@ FN uint kd_piece_at(FETCH_PARAM uint first_point, uint stride, uint piece_count,
     return piece;
 }
 
-// u < P(v) for a line that rises from a to b: u < a.u + (v - a.v) (b.u - a.u) / (b.v - a.v), multiplied out
-FN mask kd_left_of_line(scalar2 a, scalar2 b, real2 uv)
-{
-    PRECISE real side_u = (uv.x - a.x) * (b.y - a.y);
-    PRECISE real side_v = (uv.y - a.y) * (b.x - a.x);
-    return side_u < side_v;
-}
-
 // u < P(v) for a monotone cubic, a.v <= v < d.v, of the lanes `asked`. Each halving leaves a part of the curve: the
 // point is on one side of that part's box, which decides, or in it.
 FN_LARGE mask kd_left_of_cubic(scalar2 a, scalar2 b, scalar2 c, scalar2 d, real2 uv, mask asked)
 {
     mask grows = mask(a.x < d.x);
-    // coordinates from the point; Bernstein form, so that ends are exact
-    PRECISE real u0 = a.x - uv.x;
-    PRECISE real u1 = b.x - uv.x;
-    PRECISE real u2 = c.x - uv.x;
-    PRECISE real u3 = d.x - uv.x;
-    PRECISE real v0 = a.y - uv.y;
-    PRECISE real v1 = b.y - uv.y;
-    PRECISE real v2 = c.y - uv.y;
-    PRECISE real v3 = d.y - uv.y;
+    CubicFromPoint cubic = cubic_from_point(a, b, c, d, uv);
     mask left = asked;
     mask open = asked;
     real lo = real(0.0f);
     scalar width = 0.5f;
     for (int i = 0; i < kKdBisections && any_lane(open); ++i) {
         PRECISE real t = lo + width;
-        PRECISE real s = 1.0f - t;
-        PRECISE real w1 = 3.0f * s * s * t;
-        PRECISE real w2 = 3.0f * s * t * t;
-        PRECISE real w0 = s * s * s;
-        PRECISE real w3 = t * t * t;
-        PRECISE real u = (w0 * u0 + w1 * u1) + (w2 * u2 + w3 * u3);
-        PRECISE real v = (w0 * v0 + w1 * v1) + (w2 * v2 + w3 * v3);
-        mask past = v > 0.0f; // the curve reaches the point's v before t
-        left = select(open, u > 0.0f, left);
+        real2 at = cubic_offset(cubic, t);
+        mask past = at.y > 0.0f; // the curve reaches the point's v before t
+        left = select(open, at.x > 0.0f, left);
         // before t and growing, or after t and falling, the curve is where u(t) is or further left, so u(t) <= 0
         // decides; otherwise u(t) > 0 does
         open = open && differ(left, differ(past, grows));
@@ -136,7 +114,7 @@ FN mask kd_left_of_piece(FETCH_PARAM uint first_point, bool cubic, real2 uv, mas
     if (!any_lane(open))
         return left;
     if (!cubic)
-        return left || (open && kd_left_of_line(a, d, uv));
+        return left || (open && left_of_line(a, d, uv));
     scalar2 b = fetch_kd_point(FETCH_PASS first_point + 1u);
     scalar2 c = fetch_kd_point(FETCH_PASS first_point + 2u);
     return left || (open && kd_left_of_cubic(a, b, c, d, uv, open));

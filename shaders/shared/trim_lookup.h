@@ -8,7 +8,7 @@
 #endif
 
 #include "format/pack_layout.h"
-#include "shaders/shared/language.h"
+#include "shaders/shared/monotone_side.h"
 
 SHARED_OPEN
 
@@ -65,7 +65,6 @@ FN bool entry_is_last(uint word)
 // between the ends' u and v. Along the curve f(t) = ((V(t) - v) / dv + (U(t) - u) / du) / 2 grows from f(0) <= 0 to
 // f(1) >= 0. Near its root the two terms have opposite signs, and wherever they have, the curve passes uv on a known
 // side: one or two of Newton's steps get there, more only where uv lies on the curve. They are kept in their bracket.
-// Bernstein form of the distances from uv, so that ends are exact.
 FN_LARGE mask left_of_cubic(scalar2 a, scalar2 b, scalar2 c, scalar2 d, real2 uv, mask asked)
 {
     bool u_grows = a.x < d.x;
@@ -78,34 +77,22 @@ FN_LARGE mask left_of_cubic(scalar2 a, scalar2 b, scalar2 c, scalar2 d, real2 uv
     scalar k1 = 3.0f * s1;
     scalar k2 = 3.0f * (s2 - 2.0f * s1);
     scalar k3 = 1.0f - 3.0f * (s2 - s1);
-    PRECISE real u0 = a.x - uv.x;
-    PRECISE real u1 = b.x - uv.x;
-    PRECISE real u2 = c.x - uv.x;
-    PRECISE real u3 = d.x - uv.x;
-    PRECISE real v0 = a.y - uv.y;
-    PRECISE real v1 = b.y - uv.y;
-    PRECISE real v2 = c.y - uv.y;
-    PRECISE real v3 = d.y - uv.y;
+    CubicFromPoint cubic = cubic_from_point(a, b, c, d, uv);
     real lo = real(0.0f);
     real hi = real(1.0f);
-    PRECISE real t = clamp(-(u0 * per_du + v0 * per_dv), real(0.0f), real(1.0f));
+    PRECISE real t = clamp(-(cubic.u0 * per_du + cubic.v0 * per_dv), real(0.0f), real(1.0f));
     mask left = asked;
     mask moving = asked;
     for (int i = 0; i < 32 && any_lane(moving); ++i) {
-        PRECISE real s = 1.0f - t;
-        PRECISE real w1 = 3.0f * s * s * t;
-        PRECISE real w2 = 3.0f * s * t * t;
-        PRECISE real w0 = s * s * s;
-        PRECISE real w3 = t * t * t;
-        PRECISE real u = (w0 * u0 + w1 * u1) + (w2 * u2 + w3 * u3);
-        PRECISE real v = (w0 * v0 + w1 * v1) + (w2 * v2 + w3 * v3);
-        left = select(moving, u > 0.0f, left);
-        // the curve reaches uv's v at a t no smaller (v <= 0) or no larger (v >= 0): with u there on the same side
-        mask decided = u_grows ? select(left, v <= 0.0f, v >= 0.0f) : select(left, v >= 0.0f, v <= 0.0f);
-        lo = select(v < 0.0f, t, lo);
-        hi = select(v < 0.0f, hi, t);
+        real2 at = cubic_offset(cubic, t);
+        left = select(moving, at.x > 0.0f, left);
+        // the curve reaches uv's v at a t no smaller (at.y <= 0) or no larger (at.y >= 0): with u there on the same
+        // side
+        mask decided = u_grows ? select(left, at.y <= 0.0f, at.y >= 0.0f) : select(left, at.y >= 0.0f, at.y <= 0.0f);
+        lo = select(at.y < 0.0f, t, lo);
+        hi = select(at.y < 0.0f, hi, t);
         PRECISE real slope = k1 + t * (2.0f * k2 + 3.0f * t * k3);
-        PRECISE real next = t - (u * per_du + v * per_dv) / max(slope, real(1e-30f));
+        PRECISE real next = t - (at.x * per_du + at.y * per_dv) / max(slope, real(1e-30f));
         // a step that leaves the bracket is replaced by its middle
         next = select(next > lo && next < hi, next, 0.5f * (lo + hi));
         moving = moving && !decided && abs(next - t) > 2.0f * kRounding && hi - lo > kRounding;
@@ -141,10 +128,7 @@ FN mask entry_crossed(FETCH_PARAM TrimFace face, uint word, scalar eta, real2 uv
             scalar2 c2 = fetch_trim_point(FETCH_PASS first + 2u);
             left_of_piece = left_of_cubic(a, upward ? c1 : c2, upward ? c2 : c1, b, uv, between);
         } else {
-            // u < a.u + (v - a.v) (b.u - a.u) / (b.v - a.v), multiplied out
-            PRECISE real side_u = (uv.x - a.x) * (b.y - a.y);
-            PRECISE real side_v = (uv.y - a.y) * (b.x - a.x);
-            left_of_piece = side_u < side_v;
+            left_of_piece = left_of_line(a, b, uv);
         }
         left = left || (between && left_of_piece);
     }
