@@ -59,13 +59,41 @@ inline CadFace plane_face(std::vector<CadLoop> loops)
     return face;
 }
 
+inline CadSurface cylinder_surface(double radius)
+{
+    CadSurface surface;
+    surface.kind = kKindCylinder;
+    surface.radius = radius;
+    surface.period_u = 2 * M_PI;
+    surface.natural_bounds = {{0, -1e100}, {2 * M_PI, 1e100}};
+    return surface;
+}
+
+inline CadSurface sphere_surface(double radius)
+{
+    CadSurface surface;
+    surface.kind = kKindSphere;
+    surface.radius = radius;
+    surface.period_u = 2 * M_PI;
+    surface.natural_bounds = {{0, -M_PI / 2}, {2 * M_PI, M_PI / 2}};
+    return surface;
+}
+
+inline CadSurface torus_surface(double radius, double minor_radius)
+{
+    CadSurface surface;
+    surface.kind = kKindTorus;
+    surface.radius = radius;
+    surface.minor_radius = minor_radius;
+    surface.period_u = surface.period_v = 2 * M_PI;
+    surface.natural_bounds = {{0, 0}, {2 * M_PI, 2 * M_PI}};
+    return surface;
+}
+
 inline CadFace cylinder_face(double radius, std::vector<CadLoop> loops)
 {
     CadFace face = plane_face(std::move(loops));
-    face.surface.kind = kKindCylinder;
-    face.surface.radius = radius;
-    face.surface.period_u = 2 * M_PI;
-    face.surface.natural_bounds = {{0, -1e100}, {2 * M_PI, 1e100}};
+    face.surface = cylinder_surface(radius);
     return face;
 }
 

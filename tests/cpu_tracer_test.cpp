@@ -3,6 +3,7 @@
 #include "format/record_surface.h"
 #include "format/trim_query.h"
 #include "runtime/tracer.h"
+#include "tests/compare_frames.h"
 #include "tests/traced_scenes.h"
 
 #include <gtest/gtest.h>
@@ -16,35 +17,22 @@ namespace {
 
 using Point = std::array<double, 3>;
 
-struct Traced {
-    Frame frame;
-    RenderStats stats;
-};
-
-Traced render(const std::shared_ptr<const Scene>& scene, const Camera& camera, uint32_t width = 160,
-              uint32_t height = 120, TrimMode trim = TrimMode::Exact, const std::string& instruction_set = "")
+Drawn render(const std::shared_ptr<const Scene>& scene, const Camera& camera, uint32_t width = 160,
+             uint32_t height = 120, TrimMode trim = TrimMode::Exact, const std::string& instruction_set = "")
 {
-    auto tracer = make_cpu_tracer(scene, instruction_set);
-    EXPECT_TRUE(tracer.ok());
     RenderOptions options;
     options.width = width;
     options.height = height;
     options.camera = camera;
     options.trim = trim;
     options.threads = 2;
-    Traced traced;
-    Result<Frame> frame = (*tracer)->render(options, traced.stats);
-    EXPECT_TRUE(frame.ok());
-    traced.frame = std::move(*frame);
-    return traced;
+    return draw(scene, options, instruction_set);
 }
 
 Camera looking(Point eye, Point target, double fov_deg)
 {
     return {eye, target, {0, 0, 1}, fov_deg};
 }
-
-const Camera kOverview = looking({18, -26, 19}, {0, 0, 0}, 40);
 
 Point direction_of(const CameraRays& rays, double x, double y)
 {
@@ -65,12 +53,6 @@ size_t hits_of(const Frame& frame)
     for (const int32_t face : frame.face)
         hits += face >= 0;
     return hits;
-}
-
-template <class T>
-bool same_bits(const std::vector<T>& a, const std::vector<T>& b)
-{
-    return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(T)) == 0;
 }
 
 /// S(uv) and its unit normal in world mm, of the hit of a pixel; the part stands where it is.
@@ -106,15 +88,15 @@ void surface_at(const PackImage& image, const Frame& frame, size_t pixel, Point&
 TEST(cpu_tracer, gives_the_same_bits_on_every_instruction_set)
 {
     const auto scene = all_kinds().finish();
-    const Traced first = render(scene, kOverview);
+    const Drawn first = render(scene, kOverview);
     EXPECT_GT(hits_of(first.frame), 4000u);
     int compared = 0;
     for (const char* set : {"avx512", "avx2", "sse4"}) {
         if (!make_cpu_tracer(scene, set).ok())
             continue;
         for (const TrimMode trim : {TrimMode::Exact, TrimMode::Sdf, TrimMode::Hybrid, TrimMode::Kd}) {
-            const Traced base = render(scene, kOverview, 157, 93, trim);
-            const Traced other = render(scene, kOverview, 157, 93, trim, set);
+            const Drawn base = render(scene, kOverview, 157, 93, trim);
+            const Drawn other = render(scene, kOverview, 157, 93, trim, set);
             EXPECT_TRUE(same_bits(base.frame.rgba, other.frame.rgba)) << set;
             EXPECT_TRUE(same_bits(base.frame.depth_mm, other.frame.depth_mm)) << set;
             EXPECT_TRUE(same_bits(base.frame.normal, other.frame.normal)) << set;
@@ -156,12 +138,12 @@ TEST(cpu_tracer, patches_of_small_degree_give_the_same_bits_on_every_instruction
 {
     const auto scene = small_degrees().finish();
     const Camera camera = looking({5, -14, 16}, {0, 0, 0}, 52);
-    const Traced base = render(scene, camera, 301, 203);
+    const Drawn base = render(scene, camera, 301, 203);
     EXPECT_GT(hits_of(base.frame), 6000u);
     for (const char* set : {"avx512", "avx2", "sse4"}) {
         if (!make_cpu_tracer(scene, set).ok())
             continue;
-        const Traced other = render(scene, camera, 301, 203, TrimMode::Exact, set);
+        const Drawn other = render(scene, camera, 301, 203, TrimMode::Exact, set);
         EXPECT_TRUE(same_bits(base.frame.depth_mm, other.frame.depth_mm)) << set;
         EXPECT_TRUE(same_bits(base.frame.normal, other.frame.normal)) << set;
         EXPECT_TRUE(same_bits(base.frame.uv, other.frame.uv)) << set;
@@ -172,7 +154,7 @@ TEST(cpu_tracer, patches_of_small_degree_give_the_same_bits_on_every_instruction
 TEST(cpu_tracer, a_ray_that_passes_a_patchs_border_is_not_in_doubt)
 {
     // Newton is drawn outwards there, and trembles along the border where it is held
-    const Traced traced = render(small_degrees().finish(), looking({5, -14, 16}, {0, 0, 0}, 52), 602, 406);
+    const Drawn traced = render(small_degrees().finish(), looking({5, -14, 16}, {0, 0, 0}, 52), 602, 406);
     EXPECT_GT(hits_of(traced.frame), 24000u);
     EXPECT_LE(traced.stats.work.uncertified_pixels, 60u) << "of " << traced.frame.face.size();
 }
@@ -265,7 +247,7 @@ TEST(cpu_tracer, the_texture_differs_from_the_cells_only_near_the_border)
 {
     const auto scene = all_kinds().finish();
     const Frame exact = render(scene, kOverview, 320, 240).frame;
-    const Traced sdf = render(scene, kOverview, 320, 240, TrimMode::Sdf);
+    const Drawn sdf = render(scene, kOverview, 320, 240, TrimMode::Sdf);
     EXPECT_EQ(sdf.stats.trim, TrimMode::Sdf);
     size_t differ = 0;
     for (size_t i = 0; i < exact.face.size(); ++i)
@@ -278,8 +260,8 @@ TEST(cpu_tracer, hybrid_trims_answer_as_exact_ones)
 {
     const auto scene = all_kinds().finish();
     for (const Camera& camera : {kOverview, looking({2, -6, 8}, {2, -1, 0}, 30)}) {
-        const Traced exact = render(scene, camera, 320, 240);
-        const Traced hybrid = render(scene, camera, 320, 240, TrimMode::Hybrid);
+        const Drawn exact = render(scene, camera, 320, 240);
+        const Drawn hybrid = render(scene, camera, 320, 240, TrimMode::Hybrid);
         EXPECT_EQ(hybrid.stats.trim, TrimMode::Hybrid);
         EXPECT_TRUE(same_bits(exact.frame.face, hybrid.frame.face));
         EXPECT_TRUE(same_bits(exact.frame.depth_mm, hybrid.frame.depth_mm));
@@ -293,8 +275,8 @@ TEST(cpu_tracer, kd_trims_answer_as_exact_ones_with_fewer_tests)
 {
     const auto scene = all_kinds().finish();
     for (const Camera& camera : {kOverview, looking({2, -6, 8}, {2, -1, 0}, 30)}) {
-        const Traced exact = render(scene, camera, 320, 240);
-        const Traced kd = render(scene, camera, 320, 240, TrimMode::Kd);
+        const Drawn exact = render(scene, camera, 320, 240);
+        const Drawn kd = render(scene, camera, 320, 240, TrimMode::Kd);
         EXPECT_EQ(kd.stats.trim, TrimMode::Kd);
         EXPECT_EQ(exact.stats.kd_bytes, 0u);
         EXPECT_EQ(double(kd.stats.kd_bytes), kd_trim_bytes(scene->pack.image));
@@ -315,8 +297,8 @@ TEST(cpu_tracer, kd_trims_need_neither_cells_nor_textures)
     bare.pack.image.cells.clear();
     bare.pack.image.cell_entries.clear();
     bare.pack.image.sdf_words.clear();
-    const Traced with = render(whole, kOverview, 160, 120, TrimMode::Kd);
-    const Traced without = render(std::make_shared<const Scene>(bare), kOverview, 160, 120, TrimMode::Kd);
+    const Drawn with = render(whole, kOverview, 160, 120, TrimMode::Kd);
+    const Drawn without = render(std::make_shared<const Scene>(bare), kOverview, 160, 120, TrimMode::Kd);
     EXPECT_TRUE(same_bits(with.frame.face, without.frame.face));
 }
 

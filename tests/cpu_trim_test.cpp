@@ -31,10 +31,7 @@ PackImage random_faces(size_t count)
     add_face(image, {border, circle(0.5, 0.5, 0.25, 0.25), gear(0.2, 0.2, 0.15, 0.1, 11)});
     add_face(image, {circle(0.5, 0.5, 0.5, 0.5), circle(0.5, 0.5, 0.01, 0.4), star(0.3, 0.5, 0.1, 0.02, 9)});
     add_face(image, {border, circle(0.5, 0.5, 1e-3, 1e-3), circle(0.5, 0.502, 1e-4, 3e-4)});
-    std::mt19937 random(7);
-    while (image.faces.size() < count)
-        add_face(image, {random_loop(random, 3 + int(random() % 40)), random_loop(random, 5)}, 1,
-                 random() % 2 == 0 ? 1.0f : 7.0f);
+    add_random_faces(image, count);
     derive_cells(image);
     allocate_trim_memory(image, 40000, {});
     derive_sdf(image);

@@ -63,10 +63,7 @@ TEST(derive_cells, answers_as_an_exact_crossing_count_does)
     PackImage image;
     for (const std::vector<Loop>& loops : named_shapes())
         add_face(image, loops);
-    std::mt19937 rng(7);
-    while (image.faces.size() < 60)
-        add_face(image, {random_loop(rng, 3 + static_cast<int>(rng() % 40)), random_loop(rng, 5)}, 1,
-                 rng() % 2 == 0 ? 1.0f : 7.0f);
+    add_random_faces(image, 60);
     derive_cells(image);
     size_t asked = 0, near = 0;
     for (uint f = 0; f < image.faces.size(); ++f) {

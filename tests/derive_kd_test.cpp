@@ -22,10 +22,7 @@ PackImage many_faces(size_t count)
     PackImage image;
     for (const std::vector<Loop>& loops : named_shapes())
         add_face(image, loops);
-    std::mt19937 rng(7);
-    while (image.faces.size() < count)
-        add_face(image, {random_loop(rng, 3 + static_cast<int>(rng() % 40)), random_loop(rng, 5)}, 1,
-                 rng() % 2 == 0 ? 1.0f : 7.0f);
+    add_random_faces(image, count);
     return image;
 }
 

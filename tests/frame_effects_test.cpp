@@ -2,12 +2,12 @@
 // is what its lines cover, and the sum over a line is its width times its length.
 #include "runtime/frame_effects.h"
 #include "runtime/image_io.h"
+#include "tests/compare_frames.h"
 #include "tests/traced_scenes.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstring>
 #include <numbers>
 
 namespace trimray {
@@ -15,23 +15,6 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 constexpr double kRadians = kPi / 180;
-
-struct Drawn {
-    Frame frame;
-    RenderStats stats;
-};
-
-Drawn draw(const std::shared_ptr<const Scene>& scene, const RenderOptions& options,
-           const std::string& instructions = "")
-{
-    Drawn drawn;
-    auto tracer = make_cpu_tracer(scene, instructions);
-    EXPECT_TRUE(tracer.ok());
-    Result<Frame> frame = (*tracer)->render(options, drawn.stats);
-    EXPECT_TRUE(frame.ok()) << frame.error().detail;
-    drawn.frame = std::move(*frame);
-    return drawn;
-}
 
 /// From far above, nearly parallel rays, 0.1 mm a pixel.
 RenderOptions plan_view(uint32_t size = 240)
@@ -75,12 +58,6 @@ double ellipse(double a, double b)
 {
     const double h = (a - b) * (a - b) / ((a + b) * (a + b));
     return kPi * (a + b) * (1 + 3 * h / (10 + std::sqrt(4 - 3 * h)));
-}
-
-template <class T>
-bool same_bits(const std::vector<T>& a, const std::vector<T>& b)
-{
-    return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(T)) == 0;
 }
 
 TEST(frame_effects, a_straight_outline_is_as_wide_at_every_slant)
@@ -212,10 +189,7 @@ TEST(frame_effects, lines_are_of_the_classes_asked_for)
 TEST(frame_effects, change_colours_alone_and_cost_nothing_unasked)
 {
     const auto scene = all_kinds().finish();
-    RenderOptions options;
-    options.width = 157;
-    options.height = 93;
-    options.camera = {{18, -26, 19}, {0, 0, 0}, {0, 0, 1}, 40};
+    RenderOptions options = overview(157, 93);
     const Drawn plain = draw(scene, options);
     EXPECT_EQ(plain.stats.work.edge_tests, 0u);
     options.edges = EdgeLines::All;
@@ -242,10 +216,7 @@ TEST(frame_effects, change_colours_alone_and_cost_nothing_unasked)
 TEST(frame_effects, lines_are_the_same_bits_in_every_mode_that_asks_the_pieces)
 {
     const auto scene = all_kinds().finish();
-    RenderOptions options;
-    options.width = 157;
-    options.height = 93;
-    options.camera = {{18, -26, 19}, {0, 0, 0}, {0, 0, 1}, 40};
+    RenderOptions options = overview(157, 93);
     for (const EdgeLines edges : {EdgeLines::Sharp, EdgeLines::All})
         for (const bool fill : {true, false}) {
             options.edges = edges;
@@ -268,10 +239,7 @@ TEST(frame_effects, lines_are_the_same_bits_in_every_mode_that_asks_the_pieces)
 TEST(frame_effects, give_the_same_bits_on_every_instruction_set_and_any_number_of_threads)
 {
     const auto scene = all_kinds().finish();
-    RenderOptions options;
-    options.width = 301;
-    options.height = 203;
-    options.camera = {{18, -26, 19}, {0, 0, 0}, {0, 0, 1}, 40};
+    RenderOptions options = overview(301, 203);
     options.edges = EdgeLines::All;
     options.silhouettes = true;
     options.antialias_trims = true;
@@ -318,10 +286,7 @@ double psnr(const Frame& frame, const Frame& reference)
 TEST(frame_effects, antialiasing_comes_near_to_64_samples_a_pixel)
 {
     const auto scene = all_kinds().finish();
-    RenderOptions options;
-    options.width = 200;
-    options.height = 150;
-    options.camera = {{18, -26, 19}, {0, 0, 0}, {0, 0, 1}, 40};
+    RenderOptions options = overview(200, 150);
     const Frame plain = draw(scene, options).frame;
     RenderOptions many = options;
     many.width *= 8;

@@ -12,15 +12,8 @@ namespace {
 
 const Camera kClose{{2, -6, 8}, {2, -1, 0}, {0, 0, 1}, 30};
 
-struct Traced {
-    Frame frame;
-    RenderStats stats;
-};
-
-Traced render(const std::shared_ptr<const Scene>& scene, TrimMode trim, uint32_t threads, bool record = false)
+Drawn render(const std::shared_ptr<const Scene>& scene, TrimMode trim, uint32_t threads, bool record = false)
 {
-    const auto tracer = make_cpu_tracer(scene);
-    EXPECT_TRUE(tracer.ok());
     RenderOptions options;
     options.width = 320;
     options.height = 240;
@@ -29,11 +22,7 @@ Traced render(const std::shared_ptr<const Scene>& scene, TrimMode trim, uint32_t
     options.threads = threads;
     options.frames = 2;
     options.record_trim_queries = record;
-    Traced traced;
-    Result<Frame> frame = (*tracer)->render(options, traced.stats);
-    EXPECT_TRUE(frame.ok());
-    traced.frame = std::move(*frame);
-    return traced;
+    return draw(scene, options);
 }
 
 size_t asked_lanes(const std::vector<TrimQueries>& queries)
@@ -47,7 +36,7 @@ size_t asked_lanes(const std::vector<TrimQueries>& queries)
 TEST(reference_mode, gives_the_picture_that_exact_gives)
 {
     const auto scene = all_kinds().finish();
-    const Traced reference = render(scene, TrimMode::Reference, 2), exact = render(scene, TrimMode::Exact, 2);
+    const Drawn reference = render(scene, TrimMode::Reference, 2), exact = render(scene, TrimMode::Exact, 2);
     EXPECT_EQ(reference.stats.trim, TrimMode::Reference);
     EXPECT_TRUE(reference.stats.trim_queries.empty()); // nobody asked
     EXPECT_EQ(reference.frame.face, exact.frame.face);
@@ -66,15 +55,15 @@ TEST(reference_mode, needs_neither_cells_nor_textures)
         face.grid = 0;
     bare.pack.image.cells.clear();
     bare.pack.image.cell_entries.clear();
-    const Traced with = render(whole, TrimMode::Reference, 2),
-                 without = render(std::make_shared<const Scene>(bare), TrimMode::Reference, 2);
+    const Drawn with = render(whole, TrimMode::Reference, 2),
+                without = render(std::make_shared<const Scene>(bare), TrimMode::Reference, 2);
     EXPECT_EQ(with.frame.face, without.frame.face);
 }
 
 TEST(reference_mode, records_the_queries_of_one_frame)
 {
     const auto scene = all_kinds().finish();
-    const Traced one = render(scene, TrimMode::Reference, 1, true), two = render(scene, TrimMode::Reference, 2, true);
+    const Drawn one = render(scene, TrimMode::Reference, 1, true), two = render(scene, TrimMode::Reference, 2, true);
     EXPECT_EQ(one.stats.trim_queries.size(), two.stats.trim_queries.size());
     const size_t asked = asked_lanes(one.stats.trim_queries);
     EXPECT_EQ(asked, asked_lanes(two.stats.trim_queries));

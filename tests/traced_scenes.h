@@ -5,6 +5,8 @@
 #include "runtime/tracer.h"
 #include "tests/trim_shapes.h"
 
+#include <gtest/gtest.h>
+
 #include <array>
 #include <cmath>
 #include <initializer_list>
@@ -132,6 +134,41 @@ struct TracedScene {
         return scene;
     }
 };
+
+struct Drawn {
+    Frame frame;
+    RenderStats stats;
+};
+
+/// A picture by the CPU tracer. A failure is the test's, and the frame then holds nothing.
+inline Drawn draw(const std::shared_ptr<const Scene>& scene, const RenderOptions& options,
+                  const std::string& instruction_set = "")
+{
+    Drawn drawn;
+    const auto tracer = make_cpu_tracer(scene, instruction_set);
+    if (!tracer.ok()) {
+        ADD_FAILURE() << tracer.error().where << ": " << tracer.error().detail;
+        return drawn;
+    }
+    Result<Frame> frame = (*tracer)->render(options, drawn.stats);
+    if (frame.ok())
+        drawn.frame = std::move(*frame);
+    else
+        ADD_FAILURE() << frame.error().where << ": " << frame.error().detail;
+    return drawn;
+}
+
+/// From where all_kinds() is seen whole.
+inline const Camera kOverview{{18, -26, 19}, {0, 0, 0}, {0, 0, 1}, 40};
+
+inline RenderOptions overview(uint32_t width, uint32_t height)
+{
+    RenderOptions options;
+    options.width = width;
+    options.height = height;
+    options.camera = kOverview;
+    return options;
+}
 
 /// Every kind of surface once, some trimmed, one reversed, one in left-handed axes.
 inline TracedScene all_kinds()

@@ -13,21 +13,15 @@ namespace trimray {
 namespace {
 
 constexpr uint32_t kWidth = 320, kHeight = 240;
-const Camera kOverview{{18, -26, 19}, {0, 0, 0}, {0, 0, 1}, 40};
 
 Frame render(const std::shared_ptr<const Scene>& scene, const Camera& camera, TrimMode trim)
 {
-    const auto tracer = make_cpu_tracer(scene);
-    EXPECT_TRUE(tracer.ok());
     RenderOptions options;
     options.width = kWidth;
     options.height = kHeight;
     options.camera = camera;
     options.trim = trim;
-    RenderStats stats;
-    Result<Frame> frame = (*tracer)->render(options, stats);
-    EXPECT_TRUE(frame.ok());
-    return std::move(*frame);
+    return draw(scene, options).frame;
 }
 
 Picture grey(uint8_t level)

@@ -3,6 +3,7 @@
 #include "preprocess/build_pack.h"
 
 #include "preprocess/bezier_patch.h"
+#include "tests/cad_faces.h"
 #include "tests/trim_shapes.h"
 
 #include <gtest/gtest.h>
@@ -17,11 +18,6 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 
-SplineCurve2d line_curve(Vec2d a, Vec2d b)
-{
-    return {1, false, {0, 0, 1, 1}, {{a.x, a.y, 1}, {b.x, b.y, 1}}};
-}
-
 /// A cubic B-spline with its end points doubled thrice.
 SplineCurve2d spline_curve(const std::vector<Vec2d>& points)
 {
@@ -32,18 +28,6 @@ SplineCurve2d spline_curve(const std::vector<Vec2d>& points)
         curve.knots.push_back(std::clamp(i, 0, spans));
     for (const Vec2d& p : points)
         curve.control_points.push_back({p.x, p.y, 1});
-    return curve;
-}
-
-SplineCurve2d circle_curve(Vec2d c, double r)
-{
-    const double h = std::sqrt(0.5);
-    const double x[9] = {1, 1, 0, -1, -1, -1, 0, 1, 1}, y[9] = {0, 1, 1, 1, 0, -1, -1, -1, 0};
-    SplineCurve2d curve{2, true, {0, 0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 4}, {}};
-    for (int i = 0; i < 9; ++i) {
-        const double w = i % 2 == 0 ? 1 : h;
-        curve.control_points.push_back({w * (c.x + r * x[i]), w * (c.y + r * y[i]), w});
-    }
     return curve;
 }
 
@@ -226,9 +210,7 @@ TEST(trim_grow, a_rectangle_stays_its_domain)
 TEST(trim_grow, seams_and_poles_stay_and_a_closed_surface_keeps_its_period)
 {
     CadFace face = face_of({polygon({{0, 0}, {2 * kPi, 0}, {2 * kPi, 3}, {0, 3}})}, 1e-2);
-    face.surface.kind = kKindCylinder;
-    face.surface.radius = 2;
-    face.surface.period_u = 2 * kPi;
+    face.surface = cylinder_surface(2);
     face.loops[0][1].seam = face.loops[0][3].seam = true;
     const Region cylinder = region_of(face, true);
     EXPECT_TRUE(cylinder.loops.natural_border);
@@ -236,8 +218,7 @@ TEST(trim_grow, seams_and_poles_stay_and_a_closed_surface_keeps_its_period)
     EXPECT_EQ(cylinder.loops.domain.hi.x, 2 * kPi);
     EXPECT_LT(cylinder.loops.domain.lo.y, -0.9e-2);
 
-    face.surface.kind = kKindSphere;
-    face.surface.natural_bounds = {{0, -kPi / 2}, {2 * kPi, kPi / 2}};
+    face.surface = sphere_surface(2);
     for (CadEdgeUse& use : face.loops[0])
         for (auto& p : use.pcurve.control_points)
             p[1] = p[1] == 0 ? 0.3 : kPi / 2;
@@ -249,9 +230,7 @@ TEST(trim_grow, seams_and_poles_stay_and_a_closed_surface_keeps_its_period)
 
     // almost the whole period, not closed by a seam: no farther than the period
     CadFace open = face_of({polygon({{0, 0}, {2 * kPi - 1e-3, 0}, {2 * kPi - 1e-3, 3}, {0, 3}})}, 1e-2);
-    open.surface.kind = kKindCylinder;
-    open.surface.radius = 2;
-    open.surface.period_u = 2 * kPi;
+    open.surface = cylinder_surface(2);
     const Region band = region_of(open, true);
     EXPECT_TRUE(band.loops.natural_border);
     EXPECT_LE(band.loops.domain.hi.x - band.loops.domain.lo.x, 2 * kPi * (1 + 1e-15));
@@ -262,10 +241,7 @@ TEST(trim_grow, growth_is_measured_on_the_surface)
 {
     // a strip near the pole: the same length on the sphere is more of u there
     CadFace face = face_of({polygon({{1, 1.0}, {2, 1.0}, {2, 1.4}, {1, 1.4}})}, 1e-3);
-    face.surface.kind = kKindSphere;
-    face.surface.radius = 5;
-    face.surface.period_u = 2 * kPi;
-    face.surface.natural_bounds = {{0, -kPi / 2}, {2 * kPi, kPi / 2}};
+    face.surface = sphere_surface(5);
     const Rect2d d = region_of(face, true).loops.domain;
     EXPECT_GE(1 - d.lo.x, 0.97e-3 / (5 * std::cos(1.4)));
     EXPECT_GE(1.0 - d.lo.y, 0.97e-3 / 5);
@@ -274,10 +250,7 @@ TEST(trim_grow, growth_is_measured_on_the_surface)
 TEST(trim_grow, a_line_to_a_pole_does_not_move_far)
 {
     CadFace face = face_of({polygon({{0, 0}, {1.5, 0}, {1.5, kPi / 2}, {0, kPi / 2}})}, 1e-3);
-    face.surface.kind = kKindSphere;
-    face.surface.radius = 5;
-    face.surface.period_u = 2 * kPi;
-    face.surface.natural_bounds = {{0, -kPi / 2}, {2 * kPi, kPi / 2}};
+    face.surface = sphere_surface(5);
     face.loops[0][2].degenerate = true;
     const Rect2d d = region_of(face, true).loops.domain;
     EXPECT_LE(-d.lo.x, 10 * 1e-3 / 5);

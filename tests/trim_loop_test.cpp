@@ -274,10 +274,7 @@ TEST(trim_loop, gaps_are_closed_and_reported)
 CadFace sphere_face(std::vector<CadLoop> loops)
 {
     CadFace face = plane_face(std::move(loops));
-    face.surface.kind = kKindSphere;
-    face.surface.radius = 3;
-    face.surface.period_u = 2 * M_PI;
-    face.surface.natural_bounds = {{0, -M_PI / 2}, {2 * M_PI, M_PI / 2}};
+    face.surface = sphere_surface(3);
     return face;
 }
 
@@ -326,11 +323,7 @@ TEST(trim_loop, a_hole_alone_on_a_closed_surface_leaves_the_rest_of_it)
 CadFace torus_face(double radius, double minor_radius, std::vector<CadLoop> loops)
 {
     CadFace face = plane_face(std::move(loops));
-    face.surface.kind = kKindTorus;
-    face.surface.radius = radius;
-    face.surface.minor_radius = minor_radius;
-    face.surface.period_u = face.surface.period_v = 2 * M_PI;
-    face.surface.natural_bounds = {{0, 0}, {2 * M_PI, 2 * M_PI}};
+    face.surface = torus_surface(radius, minor_radius);
     return face;
 }
 

@@ -196,6 +196,15 @@ inline double exact_u_at_v(const MonotonePiece& p, double v)
     return at(p.u, lo);
 }
 
+/// Adds random faces of lines and monotone cubics of all slopes and sizes until there are `count`: always the same.
+inline void add_random_faces(PackImage& image, size_t count)
+{
+    std::mt19937 rng(7);
+    while (image.faces.size() < count)
+        add_face(image, {random_loop(rng, 3 + static_cast<int>(rng() % 40)), random_loop(rng, 5)}, 1,
+                 rng() % 2 == 0 ? 1.0f : 7.0f);
+}
+
 /// Even-odd count of crossings to the right, in double; half-open in v.
 inline bool exact_inside(const std::vector<MonotonePiece>& pieces, double u, double v)
 {
