@@ -28,7 +28,8 @@ SHARED_OPEN
 class EdgeFinder {
 public:
     EdgeFinder(const BlockJob& job, BlockScratch& scratch, const FetchSource& source, WorkCounts& work)
-        : job_(job), image_(job.scene.image), source_(source), views_(scratch.edge_views), work_(work)
+        : job_(job), image_(job.scene.image), source_(source), views_(scratch.edge_views), marks_(scratch.edge_marks),
+          work_(work)
     {
         if (job_.edges)
             views_.assign(kViews, {});
@@ -52,22 +53,44 @@ public:
             return;
         const real2 here(real(0.0f), real(0.0f));
         Nearest line{here, real(kHuge), real(1.0f)}, border{here, real(kHuge), real(1.0f)};
+        mask light(false); // lines are, there
         for (uint left = hit_lanes; left != 0;) {
             const int lane = __builtin_ctz(left);
             const mask same = hit.leaf == integer(leaves[lane]) && hit.instance == integer(instances[lane]);
             const uint lanes = lane_bits(same) & hit_lanes;
             left &= ~lanes;
+            const uint face_id = face_of(leaves[lane]);
+            if (!has_asked_borders(face_id))
+                continue;
             find_in_leaf(packet, hit, leaves[lane], instances[lane], lanes, line, border);
+            if (job_.edges->drawer && has_light_lines(image_, face_id, instances[lane]))
+                light = light || same;
         }
         const EdgeQuery& query = job_.edges->query;
         EdgeMap& map = job_.edges->map;
-        if (query.line_reach_px > 0 && keep(line, query.line_reach_px, &map.line[16 * at])) {
+        integer words;
+        if (query.line_reach_px > 0 && keep(line, query.line_reach_px, words)) {
             near |= kNearLine;
-            if (map.own_halves_drawn)
-                draw_own_halves(&map.line[16 * at], leaves, instances, rgba);
+            store(words, &map.line[16 * at]);
+            if (job_.edges->drawer) {
+                draw_own_halves(words, light, rgba);
+                marks_.near.push_back(static_cast<uint32_t>(at));
+            }
         }
-        if (query.border_reach_px > 0 && keep(border, query.border_reach_px, &map.border[16 * at]))
+        if (query.border_reach_px > 0 && keep(border, query.border_reach_px, words)) {
             near |= kNearBorder;
+            store(words, &map.border[16 * at]);
+        }
+    }
+
+    /// Draws what is left of the lines near the block's packets, all of which were asked about.
+    void draw_lines(const Block& block, Strip& strip)
+    {
+        if (!marks_.near.empty())
+            job_.edges->drawer->draw({job_.edges->drawer->rays(), int(block.x0), int(block.y0), int(block.x1),
+                                      int(block.y1), kBlockSide, strip.rgba[0], strip.depth[0], strip.normal[0],
+                                      strip.face[0], strip.instance[0]},
+                                     marks_);
     }
 
 private:
@@ -110,32 +133,39 @@ private:
         return true;
     }
 
-    /// Writes the words of what lies within reach; false: nothing does.
-    HWY_ATTR static bool keep(const Nearest& nearest, float reach_px, uint* words)
+    /// The words of what lies within reach; false: nothing does.
+    HWY_ATTR static bool keep(const Nearest& nearest, float reach_px, integer& words)
     {
         const mask within = nearest.square <= reach_px * reach_px;
         if (!any_lane(within))
             return false;
         const real2 offset = select(within, nearest.offset, real2(real(0.0f), real(0.0f)));
-        store(select(within, edge_word(offset, nearest.strength), integer(0u)), words);
+        words = select(within, edge_word(offset, nearest.strength), integer(0u));
         return true;
     }
 
-    /// Draws lines over their own pixels while these are in the caches.
-    void draw_own_halves(const uint* words, const uint (&leaves)[kLanes], const uint (&instances)[kLanes],
-                         float* rgba) const
+    /// Draws lines over their own pixels while these are in the caches: edge_lines.h's own_line_share of each word.
+    HWY_ATTR void draw_own_halves(integer words, mask light, float* rgba) const
     {
         const RenderOptions& options = job_.edges->options;
-        for (uint lane = 0; lane < kLanes; ++lane) {
-            if (words[lane] == 0)
-                continue;
-            const float share = own_line_share(words[lane], options.edge_width_px);
-            if (!(share > 0))
-                continue;
-            const std::array<float, 3> color = line_color_on(image_, options, face_of(leaves[lane]), instances[lane]);
-            float* const pixel = rgba + lane / 4 * (4 * kBlockSide) + 4 * (lane % 4);
-            for (size_t c = 0; c < 3; ++c)
-                pixel[c] = (1 - share) * pixel[c] + share * color[c];
+        const float width = options.edge_width_px;
+        const real none(0.0f);
+        const auto coordinate = [](integer steps)
+                                    HWY_ATTR { return to_real(steps & integer(0x3fffu)) * (1.0f / 256) - 32.0f; };
+        const real2 offset(coordinate(words), coordinate(words >> integer(14u)));
+        const real strength = to_real((words >> integer(28u)) - integer(1u)) / 14.0f;
+        const real covered = clamp(0.5f * width + 0.5f - length(offset), none, real(std::min(width, 1.0f)));
+        const real share = select(words != integer(0u), covered * strength, none);
+        const std::array<float, 3>& dark = options.edge_color ? *options.edge_color : kDarkLine;
+        const std::array<float, 3>& pale = options.edge_color ? *options.edge_color : kLightLine;
+        const auto color = [&](size_t c) HWY_ATTR { return select(light, real(pale[c]), real(dark[c])); };
+        alignas(64) float shares[4 * kLanes], colors[4 * kLanes];
+        store_interleaved(share, share, share, none, shares);
+        store_interleaved(color(0), color(1), color(2), none, colors);
+        for (uint row = 0; row < 4; ++row) {
+            float* const pixels = rgba + row * (4 * kBlockSide);
+            const real s = load(shares + 16 * row);
+            store((1.0f - s) * load(pixels) + s * load(colors + 16 * row), pixels);
         }
     }
 
@@ -345,8 +375,6 @@ private:
                                Nearest& line, Nearest& border)
     {
         const uint face_id = face_of(leaf);
-        if (!has_asked_borders(face_id))
-            return;
         const FaceRecord& face = image_.faces[face_id];
         Asked asked = asked_of(packet, hit, leaf, instance, lanes);
         const Grid grid = grid_of(face_id);
@@ -523,6 +551,7 @@ private:
     const PackImage& image_;
     const FetchSource& source_;
     std::vector<EdgeView>& views_; // by patch and instance
+    BlockMarks& marks_;
     WorkCounts& work_;
     UvBox free_{};
     uint free_face_ = ~0u;

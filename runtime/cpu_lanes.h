@@ -4,6 +4,7 @@
 #include "format/trim_reference.h"
 #include "runtime/border_cells.h"
 #include "runtime/cpu_view.h"
+#include "runtime/edge_lines.h"
 #include "runtime/frame_effects.h"
 #include "runtime/tracer.h"
 
@@ -19,18 +20,18 @@ struct Block {
     uint32_t x0, y0, x1, y1;
 };
 
-constexpr uint32_t kBlockSide = 64; // pixels: candidates are collected once for so many
+constexpr uint32_t kBlockSide = kEdgeBlockSide; // pixels: candidates are collected once for so many
 constexpr uint32_t kTileSide = 16;
 
-/// The pixels of a row of tiles, on their way to the frame: whole rows go there past the caches.
+/// The pixels of a row of tiles, or of a whole block, on their way to the frame: whole rows go there past the caches.
 struct Strip {
-    alignas(64) float rgba[kTileSide][kBlockSide * 4];
-    alignas(64) float normal[kTileSide][kBlockSide * 3];
-    alignas(64) float uv[kTileSide][kBlockSide * 2];
-    alignas(64) float depth[kTileSide][kBlockSide];
-    alignas(64) uint32_t face[kTileSide][kBlockSide];
-    alignas(64) uint32_t instance[kTileSide][kBlockSide];
-    alignas(64) uint8_t certified[kTileSide][kBlockSide];
+    alignas(64) float rgba[kBlockSide][kBlockSide * 4];
+    alignas(64) float normal[kBlockSide][kBlockSide * 3];
+    alignas(64) float uv[kBlockSide][kBlockSide * 2];
+    alignas(64) float depth[kBlockSide][kBlockSide];
+    alignas(64) int32_t face[kBlockSide][kBlockSide];
+    alignas(64) int32_t instance[kBlockSide][kBlockSide];
+    alignas(64) uint8_t certified[kBlockSide][kBlockSide];
 };
 
 /// A patch as the rays of a view see it.
@@ -51,6 +52,7 @@ struct BlockScratch {
     Strip strip;
     std::vector<TrimQueries> trim_queries; // of all blocks so far, where the job records them
     std::vector<EdgeView> edge_views;
+    BlockMarks edge_marks;
 };
 
 /// Borders are asked for: how far, among what, and where to note them.
@@ -58,7 +60,8 @@ struct EdgeJob {
     EdgeQuery query;
     const BorderCells& cells;
     EdgeMap& map;
-    const RenderOptions& options; // what lines look like
+    const RenderOptions& options;  // what lines look like
+    const BlockLineDrawer* drawer; // null: lines are drawn over the frame, not over each block
 };
 
 struct BlockJob {

@@ -47,8 +47,10 @@ public:
             offset_x[i] = float(i % 4) + 0.5f - middle_x;
             offset_y[i] = float(i / 4) + 0.5f - middle_y;
         }
+        const bool draws_lines = job_.edges && job_.edges->drawer; // once it is traced; until then the block is kept
         for (uint32_t ty = block.y0; ty < block.y1; ty += kTileSide) {
             const uint32_t tile_y1 = std::min(ty + kTileSide, block.y1);
+            const uint32_t strip_y0 = draws_lines ? block.y0 : ty;
             for (uint32_t tx = block.x0; tx < block.x1; tx += kTileSide) {
                 const Block tile{tx, ty, std::min(tx + kTileSide, block.x1), tile_y1};
                 choose_candidates(pixel_rect(tile));
@@ -59,13 +61,18 @@ public:
                         packet.y = load(offset_y) + real(float(y));
                         packet.alive = packet.x < float(tile.x1) - middle_x && packet.y < float(tile.y1) - middle_y;
                         const PacketHit hit = trace_packet(packet, pixel_rect({x, y, x + 4, y + 4}));
-                        write_packet(job_, packet, hit, x - block.x0, y - ty, scratch_.strip, work_);
+                        write_packet(job_, packet, hit, x - block.x0, y - strip_y0, scratch_.strip, work_);
                         if (job_.edges)
-                            edges_.find(packet, hit, x, y, &scratch_.strip.rgba[y - ty][4 * (x - block.x0)]);
+                            edges_.find(packet, hit, x, y, &scratch_.strip.rgba[y - strip_y0][4 * (x - block.x0)]);
                     }
                 }
             }
-            write_strip(scratch_.strip, block.x0, ty, block.x1 - block.x0, tile_y1 - ty, frame_);
+            if (!draws_lines)
+                write_strip(scratch_.strip, block.x0, ty, block.x1 - block.x0, tile_y1 - ty, frame_);
+        }
+        if (draws_lines) {
+            edges_.draw_lines(block, scratch_.strip);
+            write_strip(scratch_.strip, block.x0, block.y0, block.x1 - block.x0, block.y1 - block.y0, frame_);
         }
         hwy::FlushStream();
         work_.rays += uint64_t(block.x1 - block.x0) * (block.y1 - block.y0);

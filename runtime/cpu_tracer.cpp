@@ -121,13 +121,16 @@ private:
             job.record_trim_queries = options.record_trim_queries;
         }
         const bool effects = has_effects(options);
+        std::optional<BlockLineDrawer> drawer;
         std::optional<EdgeJob> edges;
         if (effects) {
             const EdgeQuery query = edge_query(options);
-            edge_map_.resize(options.width, options.height, query);
-            if (query.any())
-                edges.emplace(EdgeJob{query, *border_cells_, edge_map_, options});
+            edge_map_.resize(options.width, options.height, query.line_reach_px > 0, query.border_reach_px > 0);
             edge_map_.own_halves_drawn = own_halves_alone(options);
+            if (edge_map_.own_halves_drawn)
+                drawer.emplace(scene_->pack.image, options, edge_map_);
+            if (query.any())
+                edges.emplace(EdgeJob{query, *border_cells_, edge_map_, options, drawer ? &*drawer : nullptr});
         }
         job.edges = edges ? &*edges : nullptr;
         const uint32_t columns = (options.width + kBlockSide - 1) / kBlockSide,

@@ -1,6 +1,7 @@
 #include "runtime/frame_effects.h"
 
-#include "runtime/image_io.h"
+#include "runtime/edge_lines.h"
+#include "runtime/seen_pixels.h"
 
 #include <fmt/format.h>
 
@@ -12,25 +13,6 @@
 namespace trimray {
 namespace {
 
-struct Vec {
-    float x, y, z;
-};
-float dot(Vec a, Vec b)
-{
-    return a.x * b.x + a.y * b.y + a.z * b.z;
-}
-
-/// An edge word's offset, pixels, and strength in [0, 1]. Layout: shaders/shared/edge.h.
-struct Offset {
-    float x, y, strength;
-    float length() const { return std::sqrt(x * x + y * y); }
-};
-Offset offset_of(uint32_t word)
-{
-    constexpr float kStep = 1.0f / 256, kReach = 32;
-    return {static_cast<float>(word & 0x3fffu) * kStep - kReach,
-            static_cast<float>(word >> 14 & 0x3fffu) * kStep - kReach, static_cast<float>((word >> 28) - 1) / 14};
-}
 /// Full strength. As edge_word has it, a border through the pixel's centre keeps its direction.
 uint32_t word_of(float x, float y)
 {
@@ -45,37 +27,6 @@ uint32_t thin_word(uint32_t word)
 {
     return (word & 0x0fffffffu) | 1u << 28;
 }
-bool is_thin_word(uint32_t word)
-{
-    return word >> 28 == 1;
-}
-
-/// How much of a pixel a line of `width` covers whose middle passes at `distance`, pixels: what is summed over the
-/// pixels across a line is its width. Eq. 7's smooth function.
-float line_coverage(float distance, float width)
-{
-    return std::clamp(0.5f * width + 0.5f - distance, 0.0f, std::min(width, 1.0f));
-}
-
-/// Beyond this the coverage is 0.
-float line_reach(float width)
-{
-    return 0.5f * width + 0.5f;
-}
-
-/// The share of a colour channel, sRGB byte to linear light.
-const std::array<float, 256>& linear_of_byte()
-{
-    static const std::array<float, 256> table = [] {
-        std::array<float, 256> t{};
-        for (size_t i = 0; i < t.size(); ++i)
-            t[i] = srgb_to_linear(static_cast<float>(i) / 255);
-        return t;
-    }();
-    return table;
-}
-
-constexpr std::array<float, 3> kDarkLine = {0.012f, 0.012f, 0.015f}, kLightLine = {0.22f, 0.22f, 0.23f};
 
 constexpr uint32_t kNone = ~0u;
 
@@ -83,8 +34,7 @@ constexpr uint32_t kNone = ~0u;
 struct Mark {
     float cover = 0;             // share of the pixel that another pixel's surface has
     uint32_t cover_from = kNone; // that pixel
-    float line = 0;              // share that a line has
-    uint32_t line_from = kNone;  // the pixel whose face the line belongs to
+    LineMark line;
 };
 
 struct Painted {
@@ -92,7 +42,9 @@ struct Painted {
     std::array<float, 4> rgba;
 };
 
-constexpr uint32_t kBandRows = 64; // a multiple of a packet's 4
+constexpr uint32_t kAhead = 6; // packets or lines: memory takes as long as so many are worked on
+
+constexpr uint32_t kBandRows = kEdgeBlockSide; // rows that are drawn at once
 
 /// One band's marks, packet by packet where there are any.
 struct BandMarks {
@@ -106,15 +58,18 @@ public:
     Effects(const PackImage& image, const RenderOptions& options, EdgeMap& map, Frame& frame)
         : image_(image), options_(options), query_(edge_query(options)), map_(map), frame_(frame),
           width_(int(frame.width)), height_(int(frame.height)),
-          rays_(camera_rays(options.camera, frame.width, frame.height))
+          rays_(options.camera, frame.width, frame.height), seen_{rays_,
+                                                                  0,
+                                                                  0,
+                                                                  width_,
+                                                                  height_,
+                                                                  frame.width,
+                                                                  frame.rgba.data(),
+                                                                  frame.depth_mm.data(),
+                                                                  frame.normal.data(),
+                                                                  frame.face.data(),
+                                                                  frame.instance.data()}
     {
-        for (size_t i = 0; i < 3; ++i) {
-            corner_[i] = float(rays_.corner[i] + 0.5 * (rays_.step_x[i] + rays_.step_y[i]));
-            step_x_[i] = float(rays_.step_x[i]);
-            step_y_[i] = float(rays_.step_y[i]);
-        }
-        pixel_ = std::sqrt(step_x_[0] * step_x_[0] + step_x_[1] * step_x_[1] + step_x_[2] * step_x_[2]) /
-                 length(direction(width_ / 2, height_ / 2));
     }
 
     uint32_t band_count() const { return (frame_.height + kBandRows - 1) / kBandRows; }
@@ -124,48 +79,27 @@ public:
     void apply(uint32_t band, const std::vector<Painted>& painted) const;
 
 private:
-    static float length(Vec v) { return std::sqrt(dot(v, v)); }
-    size_t at(int x, int y) const { return size_t(y) * size_t(width_) + size_t(x); }
-    bool on_picture(int x, int y) const { return x >= 0 && y >= 0 && x < width_ && y < height_; }
-    bool is_hit(size_t i) const { return frame_.face[i] >= 0; }
-    bool same_face(size_t a, size_t b) const
-    {
-        return frame_.face[a] == frame_.face[b] && frame_.instance[a] == frame_.instance[b];
-    }
-    Vec normal(size_t i) const { return {frame_.normal[3 * i], frame_.normal[3 * i + 1], frame_.normal[3 * i + 2]}; }
-    Vec direction(int x, int y) const
-    {
-        const float fx = float(x), fy = float(y);
-        return {corner_[0] + fx * step_x_[0] + fy * step_y_[0], corner_[1] + fx * step_x_[1] + fy * step_y_[1],
-                corner_[2] + fx * step_x_[2] + fy * step_y_[2]};
-    }
-    Vec unit_direction(int x, int y) const
-    {
-        const Vec d = direction(x, y);
-        const float scale = 1 / length(d);
-        return {d.x * scale, d.y * scale, d.z * scale};
-    }
+    size_t at(int x, int y) const { return seen_.at(x, y); }
+    bool on_picture(int x, int y) const { return seen_.has(x, y); }
+    bool is_hit(size_t i) const { return seen_.is_hit(i); }
+    bool hides(int x, int y, int tx, int ty) const { return seen_.hides(x, y, tx, ty); }
+    Vec normal(size_t i) const { return seen_.normal(i); }
 
-    float plane_depth(int x, int y, int tx, int ty) const;
-    bool hides(int x, int y, int tx, int ty) const;
     float facing_square(int x, int y) const;
     bool rim_of(int x, int y, float& offset_x, float& offset_y) const;
     bool is_rim(int x, int y, float& offset_x, float& offset_y) const;
     bool ends_here(int x, int y, float& offset_x, float& offset_y) const;
     std::array<int, 2> beyond(int x, int y, Offset offset) const;
     Mark* mark(BandMarks& band, int x, int y, int y0, int y1) const;
+    void draw_outer_half(BandMarks& band, int x, int y, Offset offset, int y0, int y1) const;
     void draw_line(BandMarks& band, int x, int y, Offset offset, int y0, int y1) const;
     void cover(BandMarks& band, int x, int y, Offset offset, int y0, int y1) const;
     bool is_outline(int x, int y, Offset offset) const;
-    bool is_thin(int x, int y) const;
-    bool ends_before(int x, int y, int tx, int ty) const;
     static bool stands_for(Offset line, Offset border);
-    void fetch_early(uint32_t column, uint32_t row) const;
-    bool has_line_towards(int x, int y, int dx, int dy) const;
-    float drawn_share(int x, int y) const;
-    std::array<float, 4> color_below(int x, int y) const;
+    void fetch_early(uint32_t packet) const;
+    void draw_all(BandMarks& band, int y0, int y1) const;
+    void draw_waiting(BandMarks& band, int y0, int y1) const;
     std::array<float, 4> color(size_t i) const;
-    std::array<float, 3> line_color(size_t i) const;
 
     const PackImage& image_;
     const RenderOptions& options_;
@@ -173,38 +107,14 @@ private:
     EdgeMap& map_;
     Frame& frame_;
     const int width_, height_;
-    const CameraRays rays_;
-    float corner_[3], step_x_[3], step_y_[3];
-    float pixel_; // a pixel's width at distance 1
+    const PictureRays rays_;
+    const SeenPixels seen_;
 };
-
-/// The depth at which the pixel (tx, ty) would meet the tangent plane of what (x, y) shows; that pixel's own depth
-/// where the plane is seen too flat to tell.
-float Effects::plane_depth(int x, int y, int tx, int ty) const
-{
-    const size_t i = at(x, y);
-    const Vec n = normal(i);
-    const float here = dot(n, unit_direction(x, y)), there = dot(n, unit_direction(tx, ty));
-    constexpr float kFlat = 0.2f; // of the other angle's sine: the plane passes the eye's rays at nothing like it
-    return there * here > kFlat * here * here ? frame_.depth_mm[i] * here / there : frame_.depth_mm[i];
-}
-
-/// Whether the surface of (x, y) ends before that of (tx, ty), which lies farther back: neither tangent plane meets the
-/// other within half a pixel.
-bool Effects::hides(int x, int y, int tx, int ty) const
-{
-    const size_t i = at(x, y), t = at(tx, ty);
-    if (!is_hit(t))
-        return true;
-    constexpr float kGap = 0.5f; // pixels: nearer surfaces are told apart by their borders
-    const float gap = kGap * pixel_ * frame_.depth_mm[i];
-    return frame_.depth_mm[t] > plane_depth(x, y, tx, ty) + gap && plane_depth(tx, ty, x, y) > frame_.depth_mm[i] + gap;
-}
 
 /// Square of the cosine between ray and normal: falls linearly towards a rim, where it is 0.
 float Effects::facing_square(int x, int y) const
 {
-    const float facing = dot(normal(at(x, y)), unit_direction(x, y));
+    const float facing = dot(normal(at(x, y)), rays_.unit_direction(x, y));
     return facing * facing;
 }
 
@@ -228,7 +138,7 @@ bool Effects::rim_of(int x, int y, float& offset_x, float& offset_y) const
                 continue;
             constexpr float kAlike = 0.3f; // cosine: a rim's normals turn quickly, a border's jump
             if (std::abs(frame_.depth_mm[at(tx, ty)] - frame_.depth_mm[i]) >
-                    8 * pixel_ * frame_.depth_mm[i] / std::sqrt(std::max(g, 1e-4f)) ||
+                    8 * rays_.pixel * frame_.depth_mm[i] / std::sqrt(std::max(g, 1e-4f)) ||
                 dot(n, normal(at(tx, ty))) < kAlike)
                 continue;
             sum += float(side) * (facing_square(tx, ty) - g);
@@ -259,7 +169,7 @@ bool Effects::is_rim(int x, int y, float& offset_x, float& offset_y) const
         return false;
     constexpr float kGap = 2; // pixels
     const size_t t = at(tx, ty);
-    return !is_hit(t) || frame_.depth_mm[t] > frame_.depth_mm[at(x, y)] * (1 + kGap * pixel_);
+    return !is_hit(t) || frame_.depth_mm[t] > frame_.depth_mm[at(x, y)] * (1 + kGap * rays_.pixel);
 }
 
 /// Half a pixel towards neighbours that this surface hides: where a surface ends and neither a border nor a rim says
@@ -269,7 +179,7 @@ bool Effects::ends_here(int x, int y, float& offset_x, float& offset_y) const
     const float depth = frame_.depth_mm[at(x, y)];
     const auto ends = [&](int dx, int dy) {
         const int tx = x + dx, ty = y + dy;
-        return on_picture(tx, ty) && frame_.depth_mm[at(tx, ty)] > depth * (1 + pixel_) && hides(x, y, tx, ty);
+        return on_picture(tx, ty) && frame_.depth_mm[at(tx, ty)] > depth * (1 + rays_.pixel) && hides(x, y, tx, ty);
     };
     const int dx = int(ends(1, 0)) - int(ends(-1, 0)), dy = int(ends(0, 1)) - int(ends(0, -1));
     if (dx == 0 && dy == 0)
@@ -348,111 +258,34 @@ std::array<int, 2> Effects::beyond(int x, int y, Offset offset) const
     return {along_x ? x + s : x, along_x ? y : y + s};
 }
 
-/// Whether beyond this border nothing borders on it, so that it hides what lies behind.
+/// Whether beyond this border nothing borders on it, so that it hides what lies behind; a strip that lines at its
+/// border stand for is nothing.
 bool Effects::is_outline(int x, int y, Offset offset) const
 {
     const auto [tx, ty] = beyond(x, y, offset);
-    return on_picture(tx, ty) && ends_before(x, y, tx, ty);
+    return on_picture(tx, ty) && (hides(x, y, tx, ty) || is_thin_word(map_.border_at(tx, ty)));
 }
 
-bool Effects::is_thin(int x, int y) const
+/// The half of the line along the border at `offset` of (x, y) that lies beyond an outline.
+void Effects::draw_outer_half(BandMarks& band, int x, int y, Offset offset, int y0, int y1) const
 {
-    return (map_.near[map_.packet_of(uint32_t(x), uint32_t(y))] & kNearBorder) != 0 &&
-           is_thin_word(map_.border[map_.word_of(uint32_t(x), uint32_t(y))]);
+    const auto from = uint32_t(map_.word_of(uint32_t(x), uint32_t(y)));
+    walk_outer_half(seen_, map_, options_.edge_width_px, x, y, offset, [&](int tx, int ty, float share) {
+        if (Mark* const m = mark(band, tx, ty, y0, y1)) {
+            __builtin_prefetch(&frame_.rgba[4 * at(tx, ty)]);
+            m->line.raise(share, from);
+        }
+    });
 }
 
-/// As hides, or (tx, ty) is of a strip that lines at its border stand for.
-bool Effects::ends_before(int x, int y, int tx, int ty) const
-{
-    return hides(x, y, tx, ty) || is_thin(tx, ty);
-}
-
-/// Whether a hit's own line lies on that side of its middle.
-bool Effects::has_line_towards(int x, int y, int dx, int dy) const
-{
-    if ((map_.near[map_.packet_of(uint32_t(x), uint32_t(y))] & kNearLine) == 0)
-        return false;
-    const uint32_t word = map_.line[map_.word_of(uint32_t(x), uint32_t(y))];
-    if (word == 0)
-        return false;
-    const Offset line = offset_of(word);
-    return line.x * float(dx) + line.y * float(dy) > 0;
-}
-
-/// The share of (x, y) that its own line has in the frame as it was traced.
-float Effects::drawn_share(int x, int y) const
-{
-    if (!map_.own_halves_drawn || (map_.near[map_.packet_of(uint32_t(x), uint32_t(y))] & kNearLine) == 0)
-        return 0;
-    const uint32_t word = map_.line[map_.word_of(uint32_t(x), uint32_t(y))];
-    return word != 0 ? own_line_share(word, options_.edge_width_px) : 0.0f;
-}
-
-/// The colour that (x, y) would have without its own line; its own colour where the line covers all of it.
-std::array<float, 4> Effects::color_below(int x, int y) const
-{
-    const size_t i = at(x, y);
-    std::array<float, 4> rgba = color(i);
-    const float share = drawn_share(x, y);
-    if (share > 0 && share < 1) {
-        const std::array<float, 3> line = line_color(i);
-        for (size_t c = 0; c < 3; ++c)
-            rgba[c] = (rgba[c] - share * line[c]) / (1 - share);
-    }
-    return rgba;
-}
-
-/// The line along the border at `offset` of (x, y): this pixel's share, and beyond an outline the other half.
+/// This pixel's share of the line along the border at `offset` of (x, y), and beyond an outline the other half.
 void Effects::draw_line(BandMarks& band, int x, int y, Offset offset, int y0, int y1) const
 {
-    const size_t i = at(x, y);
-    const float width = options_.edge_width_px, distance = offset.length();
-    const auto raise = [&](int tx, int ty, float alpha) {
-        const float drawn = drawn_share(tx, ty);
-        // of equal lines the first has the pixel, in the order of packets
-        const bool first = map_.word_of(uint32_t(x), uint32_t(y)) < map_.word_of(uint32_t(tx), uint32_t(ty));
-        const bool stronger = alpha > drawn || (alpha == drawn && alpha > 0 && first);
-        Mark* const m = stronger ? mark(band, tx, ty, y0, y1) : nullptr;
-        if (m && alpha > m->line) {
-            __builtin_prefetch(&frame_.rgba[4 * at(tx, ty)]);
-            m->line = alpha;
-            m->line_from = static_cast<uint32_t>(i);
-        }
-    };
-    if (!map_.own_halves_drawn)
-        raise(x, y, line_coverage(distance, width) * offset.strength);
-    if (!(distance > 0))
-        return;
-    // beyond an outline: along each axis that the border's normal leans to, or steps of a slanting line are missed
-    constexpr float kLean = 0.4f;
-    constexpr float kUnsure = 0.3f; // pixels: so far within the border a pixel may show what lies beyond
-    const auto walk = [&](float o, int dx, int dy) {
-        const float per_step = std::abs(o) / distance; // towards the border
-        if (per_step < kLean)
-            return;
-        bool hidden = false; // what is beyond
-        for (int s = 1;; ++s) {
-            const float past = float(s) * per_step - distance;
-            if (past >= line_reach(width))
-                return;
-            if (past < -kUnsure)
-                continue;
-            const int tx = x + s * dx, ty = y + s * dy;
-            if (!on_picture(tx, ty))
-                return;
-            if (!hidden && has_line_towards(tx, ty, -dx, -dy))
-                return; // the other face's half
-            if (!hidden && !ends_before(x, y, tx, ty)) {
-                if (past < 0)
-                    continue;
-                return;
-            }
-            hidden = true;
-            raise(tx, ty, line_coverage(std::abs(past), width) * offset.strength);
-        }
-    };
-    walk(offset.x, offset.x < 0 ? -1 : 1, 0);
-    walk(offset.y, 0, offset.y < 0 ? -1 : 1);
+    const float share = line_coverage(offset.length(), options_.edge_width_px) * offset.strength;
+    if (share > 0)
+        if (Mark* const m = mark(band, x, y, y0, y1))
+            m->line.raise(share, uint32_t(map_.word_of(uint32_t(x), uint32_t(y))));
+    draw_outer_half(band, x, y, offset, y0, y1);
 }
 
 /// The shares of two neighbouring pixels' surfaces where a border passes between their middles. Source: Persson 2011,
@@ -479,7 +312,7 @@ void Effects::cover(BandMarks& band, int x, int y, Offset offset, int y0, int y1
         }
     };
     if (axis < 0.5f) {
-        if (!same_face(i, t) || hides(x, y, tx, ty))
+        if (!seen_.same_face(i, t) || hides(x, y, tx, ty))
             raise(x, y, 0.5f - axis, t);
     } else if (hides(x, y, tx, ty)) {
         raise(tx, ty, axis - 0.5f, i);
@@ -493,16 +326,6 @@ std::array<float, 4> Effects::color(size_t i) const
     return {frame_.rgba[4 * i], frame_.rgba[4 * i + 1], frame_.rgba[4 * i + 2], frame_.rgba[4 * i + 3]};
 }
 
-/// The colour of the lines of pixel i's face.
-std::array<float, 3> Effects::line_color(size_t i) const
-{
-    if (options_.edge_color)
-        return *options_.edge_color;
-    if (!options_.fill || !is_hit(i))
-        return kDarkLine;
-    return line_color_on(image_, options_, uint32_t(frame_.face[i]), uint32_t(frame_.instance[i]));
-}
-
 /// Whether a line within a pixel runs along the border, so that it is its outline too: a fillet's rim beside its
 /// border.
 bool Effects::stands_for(Offset line, Offset border)
@@ -513,13 +336,13 @@ bool Effects::stands_for(Offset line, Offset border)
 }
 
 /// Asks the caches for what drawing a packet reads: the frame went past them to memory.
-void Effects::fetch_early(uint32_t column, uint32_t row) const
+void Effects::fetch_early(uint32_t packet) const
 {
-    const size_t packet = size_t{row} * map_.columns + column;
     if (!map_.line.empty())
         __builtin_prefetch(&map_.line[16 * packet]);
     if (!map_.border.empty())
         __builtin_prefetch(&map_.border[16 * packet]);
+    const uint32_t column = packet % map_.columns, row = packet / map_.columns;
     for (uint32_t y = 4 * row; y < std::min(4 * row + 4, frame_.height); ++y) {
         const size_t i = at(int(4 * column), int(y));
         __builtin_prefetch(&frame_.rgba[4 * i]);
@@ -530,63 +353,88 @@ void Effects::fetch_early(uint32_t column, uint32_t row) const
     }
 }
 
+/// Marks what the words of the whole map have on pixels of rows [y0, y1).
+void Effects::draw_all(BandMarks& band, int y0, int y1) const
+{
+    // lines and covers reach into the band from beside it
+    const int halo = farthest_step(options_.edge_width_px) + 1;
+    const uint32_t first_row = uint32_t(std::max(y0 - halo, 0)) / 4,
+                   last_row = uint32_t(std::min(y1 + halo, height_) - 1) / 4;
+    for (uint32_t packet = first_row * map_.columns; packet < (last_row + 1) * map_.columns; ++packet) {
+        if (packet + kAhead < map_.near.size() && map_.near[packet + kAhead] != 0)
+            fetch_early(packet + kAhead);
+        const uint8_t near = map_.near[packet];
+        if (near == 0)
+            continue;
+        for (uint32_t i = 16 * packet; i < 16 * (packet + 1); ++i) {
+            const auto [x, y] = map_.pixel_of(i);
+            const uint32_t border = (near & kNearBorder) != 0 ? map_.border[i] : 0;
+            const uint32_t line = (near & kNearLine) != 0 ? map_.line[i] : 0;
+            if (line != 0)
+                draw_line(band, x, y, offset_of(line), y0, y1);
+            if (border == 0 || is_thin_word(border))
+                continue;
+            const Offset offset = offset_of(border);
+            if (options_.silhouettes && !(line != 0 && stands_for(offset_of(line), offset)) && is_outline(x, y, offset))
+                draw_line(band, x, y, offset, y0, y1);
+            if (options_.antialias_trims)
+                cover(band, x, y, offset, y0, y1);
+        }
+    }
+}
+
+/// Marks what blocks left to do on pixels of rows [y0, y1).
+void Effects::draw_waiting(BandMarks& band, int y0, int y1) const
+{
+    const int reach = farthest_step(options_.edge_width_px);
+    const uint32_t first_row = uint32_t(std::max(y0 - reach, 0)) / kEdgeBlockSide,
+                   last_row = uint32_t(std::min(y1 + reach, height_) - 1) / kEdgeBlockSide;
+    for (uint32_t row = first_row; row <= last_row; ++row)
+        for (uint32_t column = 0; column < map_.block_columns; ++column) {
+            const WaitingLines& waiting = map_.waiting[size_t{row} * map_.block_columns + column];
+            for (size_t i = 0; i < waiting.lines.size(); ++i) {
+                if (i + kAhead < waiting.lines.size())
+                    fetch_early(waiting.lines[i + kAhead] / 16);
+                const uint32_t from = waiting.lines[i];
+                const auto [x, y] = map_.pixel_of(from);
+                if (y < y0 - reach || y >= y1 + reach)
+                    continue;
+                draw_outer_half(band, x, y, offset_of(map_.line[from]), y0, y1);
+            }
+            for (const WaitingLines::Mark& waits : waiting.marks) {
+                const auto [x, y] = map_.pixel_of(waits.word);
+                if (Mark* const m = mark(band, x, y, y0, y1))
+                    m->line.raise(waits.mark.share, waits.mark.from);
+            }
+        }
+}
+
 /// The pixels of a band whose colours change, in the order of their packets.
 std::vector<Painted> Effects::paint(uint32_t band_index) const
 {
     const int y0 = int(band_index * kBandRows), y1 = std::min(y0 + int(kBandRows), height_);
     BandMarks band;
     band.place.assign(size_t{map_.columns} * (kBandRows / 4), kNone);
-    // lines and covers reach into the band from beside it
-    const int halo = int(line_reach(options_.edge_width_px) * 1.5f) + 2;
-    const uint32_t first_row = uint32_t(std::max(y0 - halo, 0)) / 4,
-                   last_row = uint32_t(std::min(y1 + halo, height_) - 1) / 4;
-    for (uint32_t row = first_row; row <= last_row; ++row)
-        for (uint32_t column = 0; column < map_.columns; ++column) {
-            const size_t packet = size_t{row} * map_.columns + column;
-            constexpr uint32_t kAhead = 6; // packets: memory takes as long as so many are worked on
-            if (!map_.own_halves_drawn && column + kAhead < map_.columns && map_.near[packet + kAhead] != 0)
-                fetch_early(column + kAhead, row);
-            const uint8_t near = map_.near[packet];
-            if (near == 0)
-                continue;
-            for (uint32_t i = 0; i < 16; ++i) {
-                const int x = int(4 * column + i % 4), y = int(4 * row + i / 4);
-                const uint32_t border = (near & kNearBorder) != 0 ? map_.border[16 * packet + i] : 0;
-                const uint32_t line = (near & kNearLine) != 0 ? map_.line[16 * packet + i] : 0;
-                if (line != 0)
-                    draw_line(band, x, y, offset_of(line), y0, y1);
-                if (border == 0 || is_thin_word(border))
-                    continue;
-                const Offset offset = offset_of(border);
-                if (options_.silhouettes && !(line != 0 && stands_for(offset_of(line), offset)) &&
-                    is_outline(x, y, offset))
-                    draw_line(band, x, y, offset, y0, y1);
-                if (options_.antialias_trims)
-                    cover(band, x, y, offset, y0, y1);
-            }
-        }
+    if (map_.own_halves_drawn)
+        draw_waiting(band, y0, y1);
+    else
+        draw_all(band, y0, y1);
     std::vector<Painted> painted;
     painted.reserve(band.marks.size() / 2);
     for (size_t place = 0; place < band.packets.size(); ++place)
         for (uint32_t i = 0; i < 16; ++i) {
             const Mark& m = band.marks[16 * place + i];
-            const uint32_t packet = band.packets[place];
-            if (m.cover_from == kNone && m.line_from == kNone)
+            if (m.cover_from == kNone && m.line.from == kNoWord)
                 continue;
+            const uint32_t packet = band.packets[place];
             const int x = int(4 * (packet % map_.columns) + i % 4), y = y0 + int(4 * (packet / map_.columns) + i / 4);
-            // straight alpha: colours are mixed by the alpha that they bring
-            std::array<float, 4> rgba = color_below(x, y);
-            const auto mix = [&rgba](const std::array<float, 4>& other, float share) {
-                const float own = (1 - share) * rgba[3], added = share * other[3], alpha = own + added;
-                for (size_t c = 0; c < 3; ++c)
-                    rgba[c] = alpha > 0 ? (own * rgba[c] + added * other[c]) / alpha : 0.0f;
-                rgba[3] = alpha;
-            };
+            std::array<float, 4> rgba = color_below(image_, options_, map_, seen_, x, y);
             if (m.cover_from != kNone)
-                mix(color(m.cover_from), m.cover);
-            if (m.line_from != kNone) {
-                const std::array<float, 3> drawn = line_color(m.line_from);
-                mix({drawn[0], drawn[1], drawn[2], 1}, m.line);
+                mix(rgba, color(m.cover_from), m.cover);
+            if (m.line.from != kNoWord) {
+                const auto [fx, fy] = map_.pixel_of(m.line.from);
+                const std::array<float, 3> drawn = line_color_at(image_, options_, seen_, at(fx, fy));
+                mix(rgba, {drawn[0], drawn[1], drawn[2], 1}, m.line.share);
             }
             painted.push_back({static_cast<uint32_t>(at(x, y)), rgba});
         }
@@ -615,11 +463,10 @@ EdgeQuery edge_query(const RenderOptions& options)
         if (options.edges == EdgeLines::All)
             query.line_classes |= 1u << kEdgeSmooth;
         query.line_width_px = options.edge_width_px;
-        // a pixel beyond an outline learns of the line from one within, up to a pixel from the border
-        query.line_reach_px = std::max(line_reach(options.edge_width_px), 1.0f);
+        query.line_reach_px = line_query_reach(options.edge_width_px);
     }
     if (options.silhouettes)
-        query.border_reach_px = std::max(line_reach(options.edge_width_px), 1.0f);
+        query.border_reach_px = line_query_reach(options.edge_width_px);
     else if (options.antialias_trims)
         query.border_reach_px = 1;
     return query;
@@ -629,30 +476,6 @@ bool own_halves_alone(const RenderOptions& options)
 {
     const EdgeQuery query = edge_query(options);
     return query.line_reach_px > 0 && query.border_reach_px == 0 && options.fill;
-}
-
-float own_line_share(uint32_t word, float width_px)
-{
-    const Offset offset = offset_of(word);
-    return line_coverage(offset.length(), width_px) * offset.strength;
-}
-
-std::array<float, 3> line_color_on(const PackImage& image, const RenderOptions& options, uint32_t face,
-                                   uint32_t instance)
-{
-    if (options.edge_color)
-        return *options.edge_color;
-    const FaceRecord& record = image.faces[face];
-    uint32_t rgba = image.instances[instance].color_rgba;
-    if ((record.flags & kFaceHasColor) != 0)
-        rgba = record.color_rgba;
-    else if (rgba >> 24 == 0)
-        return kDarkLine; // the default grey is light
-    const std::array<float, 256>& linear = linear_of_byte();
-    const float luminance =
-        0.2126f * linear[rgba & 0xffu] + 0.7152f * linear[rgba >> 8 & 0xffu] + 0.0722f * linear[rgba >> 16 & 0xffu];
-    constexpr float kDarkFace = 0.045f; // sRGB 59 of 255
-    return luminance < kDarkFace ? kLightLine : kDarkLine;
 }
 
 bool has_effects(const RenderOptions& options)
@@ -666,15 +489,6 @@ Status check_effects(const RenderOptions& options)
         return Error{ErrorCode::Usage, "--edge-width",
                      fmt::format("expected pixels in (0, {}], found {}", kLargestEdgeWidthPx, options.edge_width_px)};
     return Done{};
-}
-
-void EdgeMap::resize(uint32_t width, uint32_t height, const EdgeQuery& query)
-{
-    columns = (width + 3) / 4;
-    rows = (height + 3) / 4;
-    near.resize(size_t{columns} * rows);
-    line.resize(query.line_reach_px > 0 ? 16 * near.size() : 0);
-    border.resize(query.border_reach_px > 0 ? 16 * near.size() : 0);
 }
 
 void draw_effects(const PackImage& image, const RenderOptions& options, const RunEach& run_each, EdgeMap& map,

@@ -10,13 +10,11 @@
 #pragma once
 
 #include "format/pack_image.h"
-#include "runtime/camera.h"
+#include "runtime/edge_map.h"
 #include "runtime/tracer.h"
 
-#include <array>
 #include <cstdint>
 #include <functional>
-#include <vector>
 
 namespace trimray {
 
@@ -36,30 +34,9 @@ EdgeQuery edge_query(const RenderOptions& options);
 /// Whether a request's effects make sense. Fails: Usage.
 Status check_effects(const RenderOptions& options);
 
-/// Edge words (shaders/shared/edge.h) of a frame in packets of 4 x 4 pixels, row by row. Words of a packet mean
-/// something only where `near` says so.
-struct EdgeMap {
-    uint32_t columns = 0, rows = 0; // packets
-    std::vector<uint8_t> near;      // kNear... bits, by packet
-    std::vector<uint32_t> line, border;
-    bool own_halves_drawn = false; // by the tracer: each line word's share of its own pixel is in the frame already
-
-    void resize(uint32_t width, uint32_t height, const EdgeQuery& query);
-    size_t packet_of(uint32_t x, uint32_t y) const { return size_t{y / 4} * columns + x / 4; }
-    size_t word_of(uint32_t x, uint32_t y) const { return 16 * packet_of(x, y) + 4 * (y % 4) + x % 4; }
-};
-constexpr uint8_t kNearLine = 1, kNearBorder = 2;
-
 /// Whether a tracer may draw a line's share of its own pixel as it traces it: where nothing else changes that pixel's
 /// colour before, so that the pass has only outlines left.
 bool own_halves_alone(const RenderOptions& options);
-
-/// The share of its own pixel that the line of an edge word (not 0) takes, in [0, 1].
-float own_line_share(uint32_t word, float width_px);
-
-/// The colour of lines at borders of a face: the one asked for, or one that shows on the face. Linear light.
-std::array<float, 3> line_color_on(const PackImage& image, const RenderOptions& options, uint32_t face,
-                                   uint32_t instance);
 
 /// Runs body(i) for i in [0, count), at once where threads allow.
 using RunEach = std::function<void(uint32_t count, const std::function<void(uint32_t)>& body)>;

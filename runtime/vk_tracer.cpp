@@ -233,8 +233,10 @@ Status VulkanTracer::prepare_edges(const RenderOptions& options, uint32_t rows_p
             return readback.error();
         edges_readback_ = std::move(*readback);
     }
-    if (has_effects(options))
-        edge_map_.resize(options.width, options.height, edge_query(options));
+    if (has_effects(options)) {
+        const EdgeQuery query = edge_query(options);
+        edge_map_.resize(options.width, options.height, query.line_reach_px > 0, query.border_reach_px > 0);
+    }
     return Done{};
 }
 
