@@ -17,6 +17,7 @@ constexpr double kKeptShare = 0.5;
 struct Corner {
     Vec2d at; // mm
     double beyond_end, before_start;
+    double aside = 0; // mm off either tangent
 };
 
 /// `end` and `start` in mm, the directions of unit length.
@@ -28,11 +29,11 @@ std::optional<Corner> corner_of(Vec2d end, Vec2d along_end, Vec2d start, Vec2d a
         const double overlap = -dot(gap, along_end);
         if (!(overlap > 0 && dot(along_end, along_start) > 0))
             return std::nullopt;
-        return Corner{0.5 * (end + start), -0.5 * overlap, -0.5 * overlap};
+        return Corner{0.5 * (end + start), -0.5 * overlap, -0.5 * overlap, 0.5 * std::abs(cross(gap, along_end))};
     }
     // end + s along_end = start + t along_start
     const double s = cross(gap, along_start) / turn, t = cross(gap, along_end) / turn;
-    return Corner{end + s * along_end, s, -t};
+    return Corner{end + s * along_end, s, -t, 0};
 }
 
 /// The piece cut where its tangent's corner is, measured along the axis that it runs along most there: both parts.
@@ -56,7 +57,9 @@ bool meet_at_corner(CurvePiece& before, CurvePiece& after, Vec2d offset, Vec2d m
         return false;
     const auto corner = corner_of(end, (1 / length(leaving)) * leaving, start, (1 / length(entering)) * entering);
     const double reach = kReach * length(start - end);
-    if (!corner || std::abs(corner->beyond_end) > reach || std::abs(corner->before_start) > reach ||
+    const bool held = before.grow_mm == kHeld || after.grow_mm == kHeld;
+    if (!corner || (held && corner->aside > 0) || std::abs(corner->beyond_end) > reach ||
+        std::abs(corner->before_start) > reach ||
         -corner->beyond_end > (1 - kKeptShare) * length(in_mm(before.p[3] - before.p[0])) ||
         -corner->before_start > (1 - kKeptShare) * length(in_mm(after.p[3] - after.p[0])))
         return false;
@@ -69,23 +72,28 @@ bool meet_at_corner(CurvePiece& before, CurvePiece& after, Vec2d offset, Vec2d m
         if (piece->p[0].y == piece->p[3].y)
             at.y = piece->p[0].y + shift.y;
     }
-    const auto missing = [&](const CurvePiece& piece, Vec2d from, Vec2d to) {
+    const auto with_ends = [&](const CurvePiece& piece, Vec2d from, Vec2d to) {
         CurvePiece line = line_piece(from, to);
         line.use = piece.use;
-        line.grow_mm = piece.grow_mm;
-        between.push_back(line);
+        line.grow_mm = piece.grow_mm == kHeld ? kHeld : piece.grow_mm + corner->aside;
+        return line;
     };
-    if (corner->beyond_end > 0) {
-        missing(before, before.p[3], at);
+    if (!before.cubic) {
+        before = with_ends(before, before.p[0], at);
+    } else if (corner->beyond_end > 0) {
+        between.push_back(with_ends(before, before.p[3], at));
     } else {
         before = cut(before, at, end_direction(before)).first;
         move_end(before, at, mm_per_uv);
     }
-    if (corner->before_start > 0) {
-        missing(after, at, after.p[0] + offset);
+    const Vec2d at_after = at - offset;
+    if (!after.cubic) {
+        after = with_ends(after, at_after, after.p[3]);
+    } else if (corner->before_start > 0) {
+        between.push_back(with_ends(after, at, after.p[0] + offset));
     } else {
-        after = cut(after, at - offset, start_direction(after)).second;
-        move_start(after, at - offset, mm_per_uv);
+        after = cut(after, at_after, start_direction(after)).second;
+        move_start(after, at_after, mm_per_uv);
     }
     return true;
 }

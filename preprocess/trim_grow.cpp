@@ -169,8 +169,8 @@ Move shortest_move(const Demand& a, const Demand& b, double reach)
     const double limit = reach * std::max(a.c, b.c);
     // n_a . d = c_a, n_b . d = c_b
     const Vec2d d{(a.c * b.n.y - b.c * a.n.y) / turn, (b.c * a.n.x - a.c * b.n.x) / turn};
-    const double far = length(d);
-    if (!(far > limit))
+    const double far = length(d); // not finite where a piece turns back along its line
+    if (far <= limit)
         return {d};
     return {std::isfinite(far) ? (limit / far) * d : Vec2d{}, true};
 }
@@ -267,8 +267,11 @@ private:
         const Metric m = surface_.at(p);
         const Demand da = demand(pieces_[a], end_direction(pieces_[a]), m);
         const Demand db = demand(pieces_[b], start_direction(pieces_[b]), m);
-        const bool convex = inside_left_ ? cross(da.along, db.along) > 0 : cross(da.along, db.along) < 0;
         const bool turns_back = dot(da.along, db.along) < 0;
+        double turn = cross(da.along, db.along);
+        if (turns_back && std::abs(turn) < kSameDirection) // a cusp: its sides part farther off
+            turn = cross(pieces_[a].p[3] - pieces_[a].p[0], pieces_[b].p[3] - pieces_[b].p[0]);
+        const bool convex = inside_left_ ? turn > 0 : turn < 0;
         Move move = shortest_move(da, db, convex ? kConvexReach : kNotchReach);
         const auto moved = [&](Vec2d d) { return Vec2d{p.x + d.x / m.speed_u, p.y + d.y / m.speed_v}; };
         if (move.cut && convex && turns_back && !da.held && !db.held) {

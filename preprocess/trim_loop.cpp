@@ -3,6 +3,7 @@
 #include "format/trim_piece.h"
 #include "preprocess/trim_grow.h"
 #include "preprocess/trim_window.h"
+#include "preprocess/vec2d.h"
 
 #include <fmt/format.h>
 
@@ -62,7 +63,8 @@ private:
 };
 
 /// A closed loop of lines of one edge class that follow each other straight becomes one of longer lines: a corner is
-/// left out where it lies within `tolerance` (metric) of the line that replaces its two. Returns the largest distance.
+/// left out where it lies within `tolerance` (metric) of the line that replaces its two, and so is the tip of a line
+/// that turns back on itself. Returns the largest distance.
 double merge_lines(Pieces& pieces, const UseClasses& class_of, Vec2d metric, double tolerance)
 {
     const auto distance = [&](Vec2d p, Vec2d a, Vec2d b) {
@@ -80,19 +82,24 @@ double merge_lines(Pieces& pieces, const UseClasses& class_of, Vec2d metric, dou
             continue;
         if (!out.empty() && !piece.cubic && !out.back().cubic && class_of(piece) == class_of(out.back())) {
             const Vec2d a = out.back().p[0], middle = piece.p[0], b = piece.p[3];
-            // a line that turns back is kept, or its end would be lost
-            const double ahead = (middle.x - a.x) * (b.x - middle.x) * metric.x * metric.x +
-                                 (middle.y - a.y) * (b.y - middle.y) * metric.y * metric.y;
-            double off = distance(middle, a, b);
+            const Vec2d before{(middle.x - a.x) * metric.x, (middle.y - a.y) * metric.y};
+            const Vec2d after{(b.x - middle.x) * metric.x, (b.y - middle.y) * metric.y};
+            const bool ahead = dot(before, after) >= 0;
+            const bool held = piece.grow_mm == kHeld, alike = held == (out.back().grow_mm == kHeld);
+            // a line that turns back encloses nothing; one that is held may be a cut into the face, and is kept
+            const bool fold = !ahead && !held && corners.empty();
+            double off = fold ? std::abs(cross(before, after)) / length(before) : distance(middle, a, b);
             for (const Vec2d& corner : corners)
                 off = std::max(off, distance(corner, a, b));
-            const bool alike = (piece.grow_mm == kHeld) == (out.back().grow_mm == kHeld);
-            if (ahead >= 0 && off <= tolerance && alike) {
+            if ((ahead || fold) && off <= tolerance && alike) {
                 worst = std::max(worst, off);
-                if (piece.grow_mm != kHeld)
+                if (!held)
                     out.back().grow_mm = std::max(out.back().grow_mm, piece.grow_mm) + off;
-                corners.push_back(middle);
                 out.back().p[3] = b;
+                if (fold && a.x == b.x && a.y == b.y)
+                    out.pop_back();
+                if (!fold)
+                    corners.push_back(middle);
                 continue;
             }
         }

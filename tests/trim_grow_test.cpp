@@ -193,6 +193,30 @@ TEST(trim_grow, loops_grow_outwards_whichever_way_they_run)
     }
 }
 
+TEST(trim_grow, a_joint_of_one_direction_moves_straight_outwards_whatever_the_rounding)
+{
+    // sides of three collinear lines each, turned by all sorts of angles
+    for (int turn = 0; turn < 200; ++turn) {
+        const double angle = 0.0314 * turn;
+        std::vector<Vec2d> corners;
+        for (int side = 0; side < 4; ++side) {
+            const double at = angle + 0.5 * kPi * side;
+            for (const double along : {-1.0, -0.3, 0.4})
+                corners.push_back(
+                    {5 * (std::cos(at) - along * std::sin(at)), 5 * (std::sin(at) + along * std::cos(at))});
+        }
+        expect_grown({polygon(corners)}, 1e-3, 1.5, "turned by " + std::to_string(angle));
+    }
+}
+
+TEST(trim_grow, a_cusp_gets_a_blunt_end)
+{
+    // between a line and the circle that it touches: both leave the corner in one direction
+    const double h = std::sqrt(0.5);
+    const SplineCurve2d arc{2, true, {0, 0, 0, 1, 1, 1}, {{5, 5, 1}, {5 * h, 0, h}, {0, 0, 1}}};
+    expect_grown({{line_curve({0, 0}, {5, 0}), line_curve({5, 0}, {5, 5}), arc}}, 1e-3, 2.1, "cusp");
+}
+
 TEST(trim_grow, a_rectangle_stays_its_domain)
 {
     const Region grown = region_of(face_of({polygon({{0, 0}, {10, 0}, {10, 5}, {0, 5}})}, 1e-3), true);

@@ -271,6 +271,62 @@ TEST(trim_loop, gaps_are_closed_and_reported)
     }
 }
 
+TEST(trim_loop, ends_within_the_tolerance_meet_where_their_curves_do)
+{
+    constexpr double kTolerance = 0.05;
+    // sides of a square that end beyond its corners, or before them, or one of each
+    for (const double at_start : {-0.04, 0.03})
+        for (const double at_end : {-0.02, 0.04}) {
+            const std::vector<Vec2d> corners{{0, 0}, {10, 1}, {9, 11}, {-1, 10}};
+            CadLoop loop;
+            for (size_t i = 0; i < 4; ++i) {
+                const Vec2d a = corners[i], b = corners[(i + 1) % 4];
+                const auto at = [&](double t) { return Vec2d{a.x + t * (b.x - a.x), a.y + t * (b.y - a.y)}; };
+                loop.push_back(use_of(line_curve(at(at_start / 10), at(1 + at_end / 10))));
+            }
+            CadFace face = plane_face({loop});
+            face.tolerance_mm = kTolerance;
+            const auto loops = build_trim_loops(face, kNotGrown);
+            ASSERT_TRUE(loops.ok());
+            expect_sound(*loops);
+            EXPECT_FALSE(loops->had_open_loop);
+            EXPECT_EQ(loops->pieces.size(), 4u);
+            EXPECT_NEAR(area_of(*loops), 101, 1e-4) << at_start << " " << at_end;
+        }
+    // two half discs' arcs that run on past each other: a lens of two circles of radius 5, 6 apart
+    const auto arc = [](Vec2d c, double from, double to) {
+        const double middle = 0.5 * (from + to), w = std::cos(0.5 * (to - from));
+        return SplineCurve2d{2,
+                             true,
+                             {0, 0, 0, 1, 1, 1},
+                             {{c.x + 5 * std::cos(from), c.y + 5 * std::sin(from), 1},
+                              {w * c.x + 5 * std::cos(middle), w * c.y + 5 * std::sin(middle), w},
+                              {c.x + 5 * std::cos(to), c.y + 5 * std::sin(to), 1}}};
+    };
+    const double half = std::acos(0.6), beyond = 0.008;
+    CadFace lens = plane_face({{use_of(arc({-3, 0}, -half - beyond, half + beyond)),
+                                use_of(arc({3, 0}, M_PI - half - beyond, M_PI + half + beyond))}});
+    lens.tolerance_mm = kTolerance;
+    const auto loops = build_trim_loops(lens, kNotGrown);
+    ASSERT_TRUE(loops.ok());
+    expect_sound(*loops);
+    EXPECT_FALSE(loops->had_open_loop);
+    EXPECT_NEAR(area_of(*loops), 50 * half - 24, 1e-3);
+}
+
+TEST(trim_loop, a_side_that_turns_back_on_itself_is_one_side)
+{
+    for (const bool grow : {false, true}) {
+        CadFace face = plane_face({polygon_loop({{0, 0}, {6, 0}, {5, 0}, {10, 0}, {10, 5}, {0, 5}})});
+        for (CadEdgeUse& use : face.loops[0])
+            use.gap_mm = 1e-3;
+        const auto loops = build_trim_loops(face, {.grow = grow});
+        ASSERT_TRUE(loops.ok());
+        EXPECT_TRUE(loops->natural_border);
+        EXPECT_EQ(loops->findings.size(), 0u);
+    }
+}
+
 CadFace sphere_face(std::vector<CadLoop> loops)
 {
     CadFace face = plane_face(std::move(loops));
