@@ -24,7 +24,8 @@ void derive_sdf(PackImage& image);
 
 /// Sets image.trim_textures, and each trimmed face's sdf_size so that the textures take about total_bytes: M_i =
 /// ceil(M_total A_i / sum A), H_i = floor(sqrt(M_i)) (paper eq. 4, 5) in the square layout; the isotropic one has equal
-/// texels on the surface. Bytes are texels here: what rows padded to whole words take beyond H_i^2 comes on top.
+/// texels on the surface, and what faces leave of their M_i goes to small ones. Bytes are texels here: what rows padded
+/// to whole words take beyond H_i^2 comes on top.
 void allocate_trim_memory(PackImage& image, double total_bytes, const TrimTextureOptions& options);
 
 } // namespace trimray

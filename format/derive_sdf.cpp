@@ -12,6 +12,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <tuple>
 
 namespace trimray {
@@ -146,6 +147,7 @@ std::vector<uint> make_texture(const PackImage& image, FaceRecord& face)
 struct TextureSize {
     uint width = 0, height = 0, tile_shift = 0;
     double texel = 0; // the longer step between texels, in the unit of the metric
+    double bytes = 0; // at most
 };
 
 /// The texture of a face whose steps between texels are just below `step` along u and along v.
@@ -157,7 +159,7 @@ TextureSize size_at(const std::array<double, 2>& metric, double step, bool centr
         return static_cast<uint>(std::clamp<double>(least, 1, kMaxTextureSide));
     };
     const uint width = texels(metric[0]), height = texels(metric[1]);
-    return {width, height, tile_shift, std::max(metric[0] / (width + around), metric[1] / (height + around))};
+    return {width, height, tile_shift, std::max(metric[0] / (width + around), metric[1] / (height + around)), 0};
 }
 
 /// How many tiles the border's surroundings touch: at least as many as the texture will keep, and few more.
@@ -219,8 +221,9 @@ TextureSize finest(const std::array<double, 2>& metric, bool centres, uint tile_
     double lo = finest_step, hi = coarsest_step;
     for (int i = 0; i <= halvings; ++i) {
         const double step = i == 0 ? hi : std::sqrt(lo * hi);
-        const TextureSize size = size_at(metric, step, centres, tile_shift);
-        const bool fits = bytes_of(size) <= bytes;
+        TextureSize size = size_at(metric, step, centres, tile_shift);
+        size.bytes = bytes_of(size);
+        const bool fits = size.bytes <= bytes;
         if (fits && (best.width == 0 || size.texel < best.texel))
             best = size;
         if (!fits && i == 0)
@@ -236,10 +239,13 @@ TextureSize isotropic_size(const PackImage& image, const FaceRecord& face, doubl
     const bool centres = image.trim_textures.source == TrimSource::Mask;
     const std::array<double, 2> metric = metric_of(face);
     const double coarsest = std::max(metric[0], metric[1]), even = std::sqrt(metric[0] * metric[1] / bytes);
-    TextureSize best = finest(metric, centres, 0, 0.5 * std::min(even, coarsest), coarsest, 30, bytes,
-                              [](const TextureSize& s) { return 4.0 * texture_shape(s.width, s.height, 0).words(0); });
-    if (best.width == 0) // every texture has a word
-        return size_at(metric, coarsest, centres, 0);
+    const auto bytes_of_rows = [](const TextureSize& s) { return 4.0 * texture_shape(s.width, s.height, 0).words(0); };
+    TextureSize best = finest(metric, centres, 0, 0.5 * std::min(even, coarsest), coarsest, 30, bytes, bytes_of_rows);
+    if (best.width == 0) { // every texture has a word
+        best = size_at(metric, coarsest, centres, 0);
+        best.bytes = bytes_of_rows(best);
+        return best;
+    }
     constexpr double kLeastGain = 0.97; // of a texel's length: below it the tiles' entries are not worth a fetch
     const std::vector<MonotonePiece> pieces = pieces_of(image, face);
     for (const uint tile_shift : {2u, 3u}) {
@@ -262,7 +268,32 @@ TextureSize isotropic_size(const PackImage& image, const FaceRecord& face, doubl
 TextureSize square_size(double bytes)
 {
     const double side = std::min<double>(kMaxTextureSide, std::floor(std::sqrt(std::ceil(bytes))));
-    return {static_cast<uint>(side), static_cast<uint>(side), 0, 0};
+    return {static_cast<uint>(side), static_cast<uint>(side), 0, 0, 0};
+}
+
+void set_size(FaceRecord& face, const TextureSize& size)
+{
+    face.sdf_size = size.width | size.height << 16;
+    face.flags = (face.flags & ~(kFaceTileShiftMask << kFaceTileShiftBit)) | size.tile_shift << kFaceTileShiftBit;
+}
+
+/// Gives what the faces' shares of `total_bytes` left, in equal parts, to the faces for which that is much. A share is
+/// left in part where sides are whole texels, where a straight border costs a row of tiles more than fits, and where a
+/// texture's tiles have no more numbers. Shapes: bytes by face, as their textures are; 0 for faces without trims.
+void spread_unspent(PackImage& image, double total_bytes, const std::vector<double>& bytes)
+{
+    constexpr double kMuch = 0.1; // of a texture's bytes
+    const double unspent = total_bytes - std::accumulate(bytes.begin(), bytes.end(), 0.0);
+    const auto faces_below = [&](double most) {
+        return static_cast<double>(
+            std::count_if(bytes.begin(), bytes.end(), [&](double b) { return b > 0 && b < most; }));
+    };
+    const double most = unspent / std::max(faces_below(std::numeric_limits<double>::infinity()), 1.0) / kMuch;
+    const double each = unspent / std::max(faces_below(most), 1.0);
+    tbb::parallel_for(size_t{0}, bytes.size(), [&](size_t f) {
+        if (bytes[f] > 0 && bytes[f] < most)
+            set_size(image.faces[f], isotropic_size(image, image.faces[f], bytes[f] + each));
+    });
 }
 
 } // namespace
@@ -316,6 +347,7 @@ void allocate_trim_memory(PackImage& image, double total_bytes, const TrimTextur
 
     const double floor_bytes = std::min(kFloorBytes, 0.5 * total_bytes / faces);
     const double shared_bytes = total_bytes - floor_bytes * faces;
+    std::vector<double> bytes(image.faces.size(), 0);
     tbb::parallel_for(size_t{0}, image.faces.size(), [&](size_t f) {
         FaceRecord& face = image.faces[f];
         if (face.piece_count == 0)
@@ -324,9 +356,11 @@ void allocate_trim_memory(PackImage& image, double total_bytes, const TrimTextur
         const TextureSize size = options.layout == TrimLayout::Square
                                      ? square_size(total_bytes * share)
                                      : isotropic_size(image, face, floor_bytes + shared_bytes * share);
-        face.sdf_size = size.width | size.height << 16;
-        face.flags |= size.tile_shift << kFaceTileShiftBit;
+        set_size(face, size);
+        bytes[f] = size.bytes;
     });
+    if (options.layout == TrimLayout::Isotropic)
+        spread_unspent(image, total_bytes, bytes);
 }
 
 } // namespace trimray

@@ -184,15 +184,15 @@ TEST(derive_sdf, isotropic_layout_keeps_to_the_total_and_spares_small_faces)
             allocate_trim_memory(image, total, {source, TrimLayout::Isotropic});
             derive_sdf(image);
             EXPECT_LE(4.0 * static_cast<double>(image.sdf_words.size()), total);
-            EXPECT_GE(4.0 * static_cast<double>(image.sdf_words.size()), 0.8 * total);
+            // what faces leave of their shares goes to those that can use it
+            EXPECT_GE(4.0 * static_cast<double>(image.sdf_words.size()), (total < 1000 ? 0.8 : 0.9) * total);
             const double floor_bytes = std::min(64.0, 0.1 * total);
             for (uint f = 0; f < 5; ++f) {
                 const FaceRecord& face = image.faces[f];
                 const size_t end = f + 1 < 5 ? image.faces[f + 1].sdf_first_word : image.sdf_words.size();
                 const double bytes = 4.0 * static_cast<double>(end - face.sdf_first_word);
                 // M_i = ceil(M_total A_i / sum A), after what each face gets
-                EXPECT_LE(bytes, std::ceil(floor_bytes + (total - 5 * floor_bytes) * face.area_mm2 / area));
-                EXPECT_GE(bytes, 0.7 * floor_bytes);
+                EXPECT_GE(bytes, 0.6 * std::ceil(floor_bytes + (total - 5 * floor_bytes) * face.area_mm2 / area));
                 const uint width = face.sdf_size & 0xffffu, height = face.sdf_size >> 16;
                 if (width >= 8 && height >= 8) {
                     EXPECT_NEAR((face.extent_mm[0] / width) / (face.extent_mm[1] / height), 1, 0.15);
