@@ -302,6 +302,7 @@ private:
 
     /// What a leaf's hits are measured with.
     struct Asked {
+        explicit Asked(const PatchRecord& of) : patch(of) {} // the rest is not zeroed: it is 2 KB
         const PatchRecord& patch;
         mask here;
         uint lanes;
@@ -354,9 +355,13 @@ private:
         const real3 w = w0 + across;
         const real t = (hit.best - view.base_mm) * (1 / view.mm_per_t);
         const real3 p = middle + across * real(view.tau) + w * t;
-        Asked asked{
-            patch, lanes_of(lanes), lanes,      hit.uv_face, pixel_rows(w, step_x, step_y, t + view.tau), {}, {},
-            p,     real(1.0f),      hit.uv_face};
+        Asked asked(patch);
+        asked.here = lanes_of(lanes);
+        asked.lanes = lanes;
+        asked.uv = hit.uv_face;
+        asked.rows = pixel_rows(w, step_x, step_y, t + view.tau);
+        asked.p = p;
+        asked.line_strength = real(1.0f);
         const scalar2 uv_scale(patch.uv_scale[0], patch.uv_scale[1]);
         if (is_bezier(patch)) {
             const SurfacePoint s = bezier_at(patch, hit.uv_face);
@@ -492,7 +497,7 @@ private:
                 const float* p =
                     image_.trim_points.data() + 2 * (size_t(face.first_point) + (word >> kPiecePointShift));
                 const uint last = (word & kPieceCubic) != 0 ? 3 : 1;
-                if (outside(box, p, last))
+                if (outside(box, p, last) || aside(box, p, last))
                     continue;
                 const uint edge_class = word >> kPieceClassShift & 3u;
                 if (last == 1)

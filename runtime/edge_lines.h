@@ -86,8 +86,16 @@ inline void mix(std::array<float, 4>& color, const std::array<float, 4>& other, 
 }
 
 constexpr float kLeastLean = 0.4f; // a border is walked to along an axis that has so much of its normal's length
+constexpr float kUnsure = 0.3f;    // pixels: so far within the border a pixel may show what lies beyond
 /// The most steps that a walk takes.
 int farthest_step(float width);
+
+/// How far the line of a word, not 0, lies from its pixel's middle in the direction (dx, dy), along an axis.
+inline float line_along(uint32_t word, int dx, int dy)
+{
+    const Offset line = offset_of(word);
+    return line.x * static_cast<float>(dx) + line.y * static_cast<float>(dy);
+}
 
 /// Walks from (x, y) beyond the outline at `offset`, along each axis that the border's normal leans to, or steps of a
 /// slanting line are missed; calls raise(tx, ty, share) where the line takes more of a pixel than the pixel's own line.
@@ -97,7 +105,23 @@ template <class Raise>
 bool walk_outer_half(const SeenPixels& pixels, const EdgeMap& map, float width, int x, int y, Offset offset,
                      Raise raise)
 {
-    constexpr float kUnsure = 0.3f; // pixels: so far within the border a pixel may show what lies beyond
+    // At most borders the other face's half begins at the next pixel. So near to the border a walk asks about that one
+    // first: 1 * kLeastLean - distance >= -kUnsure
+    constexpr float kNear = kLeastLean + kUnsure - 0.01f;
+    bool walks_x = true, walks_y = true;
+    const int next_x = offset.x < 0 ? -1 : 1, next_y = offset.y < 0 ? -1 : 1;
+    if (offset.x * offset.x + offset.y * offset.y < kNear * kNear) {
+        const auto ends = [&](int dx, int dy) {
+            if (!pixels.has(x + dx, y + dy))
+                return false;
+            const uint32_t word = map.line_at(x + dx, y + dy);
+            return word != 0 && line_along(word, dx, dy) < 0;
+        };
+        walks_x = !ends(next_x, 0);
+        walks_y = !ends(0, next_y);
+        if (!walks_x && !walks_y)
+            return true;
+    }
     const float distance = offset.length();
     if (!(distance > 0))
         return true;
@@ -117,11 +141,8 @@ bool walk_outer_half(const SeenPixels& pixels, const EdgeMap& map, float width, 
                 return !pixels.rays.on_picture(tx, ty);
             if (!hidden) {
                 const uint32_t word = map.line_at(tx, ty);
-                if (word != 0) {
-                    const Offset line = offset_of(word);
-                    if (line.x * static_cast<float>(dx) + line.y * static_cast<float>(dy) < 0)
-                        return true; // the other face's half
-                }
+                if (word != 0 && line_along(word, dx, dy) < 0)
+                    return true; // the other face's half
                 if (!pixels.hides(x, y, tx, ty) && !is_thin_word(map.border_at(tx, ty))) {
                     if (past < 0)
                         continue;
@@ -139,8 +160,9 @@ bool walk_outer_half(const SeenPixels& pixels, const EdgeMap& map, float width, 
                 raise(tx, ty, share);
         }
     };
-    const bool along_x = walk(offset.x, offset.x < 0 ? -1 : 1, 0);
-    return walk(offset.y, 0, offset.y < 0 ? -1 : 1) && along_x;
+    const bool x_done = !walks_x || walk(offset.x, next_x, 0);
+    const bool y_done = !walks_y || walk(offset.y, 0, next_y);
+    return x_done && y_done;
 }
 
 /// The colour that (x, y) would have without its own line; its own colour where the line covers all of it.

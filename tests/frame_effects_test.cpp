@@ -241,16 +241,42 @@ TEST(frame_effects, give_the_same_bits_on_every_instruction_set_and_any_number_o
     const auto scene = all_kinds().finish();
     RenderOptions options = overview(301, 203);
     options.edges = EdgeLines::All;
-    options.silhouettes = true;
-    options.antialias_trims = true;
-    options.threads = 1;
-    const Drawn first = draw(scene, options);
-    options.threads = 4;
-    EXPECT_TRUE(same_bits(first.frame.rgba, draw(scene, options).frame.rgba));
-    for (const char* set : {"avx512", "avx2", "sse4"})
-        if (make_cpu_tracer(scene, set).ok()) {
-            EXPECT_TRUE(same_bits(first.frame.rgba, draw(scene, options, set).frame.rgba)) << set;
+    for (const bool with_borders : {true, false}) { // drawn over the frame, or block by block
+        options.silhouettes = options.antialias_trims = with_borders;
+        options.threads = 1;
+        const Drawn first = draw(scene, options);
+        options.threads = 4;
+        EXPECT_TRUE(same_bits(first.frame.rgba, draw(scene, options).frame.rgba));
+        for (const char* set : {"avx512", "avx2", "sse4"})
+            if (make_cpu_tracer(scene, set).ok()) {
+                EXPECT_TRUE(same_bits(first.frame.rgba, draw(scene, options, set).frame.rgba)) << set;
+            }
+    }
+}
+
+TEST(frame_effects, lines_drawn_while_a_block_is_traced_are_those_drawn_over_the_frame)
+{
+    const auto scene = all_kinds().finish();
+    RenderOptions options = overview(301, 203);
+    const Drawn plain = draw(scene, options);
+    options.edge_color = {0, 0, 0};
+    for (const float width : {0.5f, 1.5f, 9.0f, kLargestEdgeWidthPx}) {
+        options.edge_width_px = width;
+        options.edges = EdgeLines::All;
+        options.fill = true; // block by block
+        const Drawn filled = draw(scene, options);
+        const Drawn lines = draw(scene, lines_only(options, EdgeLines::All));
+        double worst = 0, covered = 0;
+        for (size_t i = 0; i < plain.frame.rgba.size(); ++i) {
+            const float share = lines.frame.rgba[i / 4 * 4 + 3], below = plain.frame.rgba[i];
+            const float expected = i % 4 < 3 ? (1 - share) * below : below + (1 - below) * share;
+            worst = std::max(worst, double(std::abs(filled.frame.rgba[i] - expected)));
+            covered += double(share);
         }
+        // a line is taken off a pixel again before a stronger one is drawn: rounding of 1 / (1 - share)
+        EXPECT_LT(worst, 1e-3) << width;
+        EXPECT_GT(covered, 1000) << width;
+    }
 }
 
 TEST(frame_effects, far_away_a_face_is_never_more_than_half_lines)
