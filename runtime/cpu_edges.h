@@ -35,13 +35,19 @@ public:
             views_.assign(kViews, {});
     }
 
+    /// Whether borders that are asked for may be seen among these leaves. Where not, the map is as it should be.
+    bool concerns(const std::vector<Candidate>& candidates) const
+    {
+        return std::any_of(candidates.begin(), candidates.end(),
+                           [this](const Candidate& c) { return has_asked_borders(face_of(c.leaf)); });
+    }
+
     /// Notes what is near the packet whose first pixel is (x, y) of the picture; its colours begin at `rgba`, in a
     /// strip.
     HWY_ATTR void find(const Packet& packet, const PacketHit& hit, uint32_t x, uint32_t y, float* rgba)
     {
         const size_t at = job_.edges->map.packet_of(x, y);
         uint8_t& near = job_.edges->map.near[at];
-        near = 0;
         const uint hit_lanes = lane_bits(packet.alive && hit.best < kHuge);
         if (hit_lanes == 0)
             return;

@@ -47,7 +47,8 @@ public:
             offset_x[i] = float(i % 4) + 0.5f - middle_x;
             offset_y[i] = float(i / 4) + 0.5f - middle_y;
         }
-        const bool draws_lines = job_.edges && job_.edges->drawer; // once it is traced; until then the block is kept
+        const bool has_borders = job_.edges && edges_.concerns(scratch_.candidates);
+        const bool draws_lines = has_borders && job_.edges->drawer; // once it is traced; until then the block is kept
         for (uint32_t ty = block.y0; ty < block.y1; ty += kTileSide) {
             const uint32_t tile_y1 = std::min(ty + kTileSide, block.y1);
             const uint32_t strip_y0 = draws_lines ? block.y0 : ty;
@@ -62,7 +63,7 @@ public:
                         packet.alive = packet.x < float(tile.x1) - middle_x && packet.y < float(tile.y1) - middle_y;
                         const PacketHit hit = trace_packet(packet, pixel_rect({x, y, x + 4, y + 4}));
                         write_packet(job_, packet, hit, x - block.x0, y - strip_y0, scratch_.strip, work_);
-                        if (job_.edges)
+                        if (has_borders)
                             edges_.find(packet, hit, x, y, &scratch_.strip.rgba[y - strip_y0][4 * (x - block.x0)]);
                     }
                 }

@@ -25,7 +25,7 @@ void EdgeMap::resize(uint32_t width, uint32_t height, bool lines, bool borders)
 {
     columns = (width + 3) / 4;
     rows = (height + 3) / 4;
-    near.resize(size_t{columns} * rows);
+    near.assign(size_t{columns} * rows, 0);
     line.resize(lines ? 16 * near.size() : 0);
     border.resize(borders ? 16 * near.size() : 0);
     block_columns = (width + kEdgeBlockSide - 1) / kEdgeBlockSide;

@@ -51,7 +51,7 @@ struct EdgeMap {
     uint32_t block_columns = 0;
     std::vector<WaitingLines> waiting; // by block of kEdgeBlockSide, row by row; only where own_halves_drawn
 
-    /// For a picture of this size; `lines` and `borders`: which words there are. What was noted is lost.
+    /// For a picture of this size; `lines` and `borders`: which words there are. Nothing is near anything then.
     void resize(uint32_t width, uint32_t height, bool lines, bool borders);
     size_t packet_of(uint32_t x, uint32_t y) const { return size_t{y / 4} * columns + x / 4; }
     size_t word_of(uint32_t x, uint32_t y) const { return 16 * packet_of(x, y) + 4 * (y % 4) + x % 4; }
