@@ -56,6 +56,13 @@ TRIMRAY_CONST uint kFaceTexelCentres = 32u; // texels at (i + 0.5) / width, see 
 // and where tiles of a distance texture are kept, the logarithm of a tile's side in steps between texels; 0: rows
 TRIMRAY_CONST uint kFaceTileShiftBit = 8u;
 TRIMRAY_CONST uint kFaceTileShiftMask = 7u;
+// and of a face of a closed shell how far its border may lie beyond its edges: within 2^-k_u of it along u and 2^-k_v
+// along v, 1 <= k <= 31, its back is no surface for rays from outside of the shell (shaders/shared/rim.h). Two fields
+// of 5 bits, k_u first; both 0: no rim
+TRIMRAY_CONST uint kFaceRimBit = 11u;
+TRIMRAY_CONST uint kFaceRimBits = 5u;
+TRIMRAY_CONST uint kFaceRimMask = 31u;
+TRIMRAY_CONST uint kFaceRims = (kFaceRimMask | kFaceRimMask << kFaceRimBits) << kFaceRimBit;
 
 // A patch: one native surface, or one Bezier patch, of one face.
 struct PatchRecord {

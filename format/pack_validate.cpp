@@ -274,8 +274,11 @@ private:
     void check_face_numbers(const FaceRecord& f, size_t i)
     {
         constexpr uint kKnownFlags = kFaceReversed | kFaceNaturalBorder | kFaceHasColor | kFaceApproximated |
-                                     kFaceOpenLoop | kFaceTexelCentres | kFaceTileShiftMask << kFaceTileShiftBit;
-        if (f.surface_kind >= kSurfaceKindCount || (f.flags & ~kKnownFlags) != 0 ||
+                                     kFaceOpenLoop | kFaceTexelCentres | kFaceTileShiftMask << kFaceTileShiftBit |
+                                     kFaceRims;
+        const uint rim_u = f.flags >> kFaceRimBit & kFaceRimMask;
+        const uint rim_v = f.flags >> (kFaceRimBit + kFaceRimBits) & kFaceRimMask;
+        if (f.surface_kind >= kSurfaceKindCount || (f.flags & ~kKnownFlags) != 0 || (rim_u == 0) != (rim_v == 0) ||
             f.border_classes > ((f.flags & kFaceNaturalBorder) != 0 ? 0xffu : 0u))
             report_.add(3211, "FACE", fmt::format("face {}: kind {}, flags {:#x}", i, f.surface_kind, f.flags));
         const float numbers[] = {f.sdf_texel_mm, f.sdf_band_texels, f.area_mm2,    f.tolerance_mm,

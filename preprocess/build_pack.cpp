@@ -2,6 +2,7 @@
 
 #include "format/derive_kd.h"
 #include "preprocess/bezier_patch.h"
+#include "preprocess/closed_shell.h"
 #include "preprocess/proxy_mesh.h"
 
 #include <algorithm>
@@ -9,6 +10,7 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
+#include <span>
 
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
@@ -29,6 +31,7 @@ struct ConvertedFace {
     uint32_t part = 0;
     std::string dropped_reason; // empty: converted
     TrimLoops trims;
+    uint32_t rims = 0; // rim_flags
     SurfaceExtent extent;
     double inside_fraction = 1;
     std::vector<PatchRecord> patches; // first_control_point relative to control_points
@@ -172,7 +175,7 @@ FaceRecord face_record(const ConvertedFace& face, StringTable& strings)
     r.color_rgba = cad.color_rgba.value_or(0);
     r.flags = (cad.reversed ? kFaceReversed : 0) | (face.trims.natural_border ? kFaceNaturalBorder : 0) |
               (cad.color_rgba ? kFaceHasColor : 0) | (cad.surface.deviation_mm > 0 ? kFaceApproximated : 0) |
-              (face.trims.had_open_loop ? kFaceOpenLoop : 0);
+              (face.trims.had_open_loop ? kFaceOpenLoop : 0) | face.rims;
     r.area_mm2 = rough(face.extent.area_mm2 * face.inside_fraction);
     r.tolerance_mm = static_cast<float>(cad.tolerance_mm);
     r.deviation_mm = static_cast<float>(cad.surface.deviation_mm);
@@ -186,6 +189,18 @@ FaceRecord face_record(const ConvertedFace& face, StringTable& strings)
     r.domain_hi[0] = face.trims.domain.hi.x;
     r.domain_hi[1] = face.trims.domain.hi.y;
     return r;
+}
+
+/// Gives the faces of a part's closed shells their rims. Domain: converted faces.
+void find_rims(const CadPart& part, std::span<ConvertedFace> faces)
+{
+    std::vector<ShellFace> shell;
+    for (const ConvertedFace& face : faces)
+        shell.push_back({face.cad, face.dropped_reason.empty() ? &face.trims : nullptr});
+    const std::vector<uint8_t> closed = in_closed_shells(shell, part.edges.size());
+    for (size_t f = 0; f < faces.size(); ++f)
+        if (closed[f])
+            faces[f].rims = rim_flags(faces[f].cad->surface, faces[f].trims);
 }
 
 void append_face(const ConvertedFace& face, PackImage& image)
@@ -280,6 +295,10 @@ void run(const CadModel& model, const BuildOptions& options, PackImage& image, B
     for_each_face([&](ConvertedFace& face) {
         if (face.dropped_reason.empty())
             convert_surface(face, frames[face.part], options.trims);
+    });
+    tbb::parallel_for(size_t{0}, model.parts.size(), [&](size_t part) {
+        const size_t first = first_of_part[part];
+        find_rims(model.parts[part], std::span(faces).subspan(first, first_of_part[part + 1] - first));
     });
     std::vector<std::vector<uint>> face_ids(model.parts.size());
     for (size_t part = 0; part < model.parts.size(); ++part) {

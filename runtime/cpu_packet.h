@@ -19,6 +19,7 @@
 #include "shaders/shared/leaf_box.h"
 #include "shaders/shared/patch_newton.h"
 #include "shaders/shared/quadric.h"
+#include "shaders/shared/rim.h"
 #include "shaders/shared/torus.h"
 
 #include <hwy/cache_control.h>
@@ -163,7 +164,9 @@ private:
         const scalar3 w0(view.w0[0], view.w0[1], view.w0[2]);
         const real3 origin = middle + across * real(view.tau);
         const real3 direction = w0 + across;
-        Target target{candidate, view, patch, image_.faces[patch.face], false};
+        const FaceRecord& face = image_.faces[patch.face];
+        const bool rim = (face.flags & kFaceRims) != 0 && job_.view.instances[candidate.instance].outside;
+        Target target{candidate, view, patch, face, rim, direction, false};
         const scalar r = patch.param[0], second = patch.param[1];
         switch (patch.shape & 0xffu) {
         case kKindPlane: {
@@ -205,6 +208,8 @@ private:
         const PatchView& view;
         const PatchRecord& patch;
         const FaceRecord& face;
+        bool rim; // the face has one, and the eye sees it from outside
+        const real3& direction;
         bool changed;
     };
 
@@ -357,10 +362,12 @@ private:
         if (!any_lane(taken))
             return;
         if ((target.face.flags & kFaceNaturalBorder) == 0) {
-            taken =
-                taken && (job_.reference != nullptr ? inside_by_reference(job_, target.patch.face, uv, taken, scratch_)
-                                                    : inside_trims(source_, job_.trim, target.patch.face, target.face,
-                                                                   uv, taken, work_.curve_tests));
+            taken = taken && inside_loops(target, uv, taken);
+            if (!any_lane(taken))
+                return;
+        }
+        if (target.rim) {
+            taken = taken && !in_rim(target, taken, uv, normal);
             if (!any_lane(taken))
                 return;
         }
@@ -370,6 +377,35 @@ private:
         hit.uv_face = select(taken, uv, hit.uv_face);
         hit.normal = select(taken, normal, hit.normal);
         target.changed = true;
+    }
+
+    /// Lanes of `asked` that lie inside the loops of a face that has some.
+    HWY_ATTR mask inside_loops(const Target& target, real2 uv, mask asked)
+    {
+        const uint face = target.patch.face;
+        return job_.reference != nullptr
+                   ? inside_by_reference(job_, face, uv, asked, scratch_)
+                   : inside_trims(source_, job_.trim, face, target.face, uv, asked, work_.curve_tests);
+    }
+
+    /// Lanes of `asked`, hits inside of the face, that show the back of its rim.
+    HWY_ATTR HWY_NOINLINE mask in_rim(const Target& target, mask asked, real2 uv, real3 normal)
+    {
+        const bool turned = ((target.face.flags & kFaceReversed) != 0) !=
+                            (job_.scene.left_handed[image_.leaves[target.candidate.leaf].patch] != 0);
+        const real facing = dot(target.direction, normal);
+        const mask back = asked && (turned ? facing < 0.0f : facing > 0.0f);
+        mask rim(false);
+        for (int corner = 0; corner < kRimCorners && any_lane(back && !rim); ++corner) {
+            const real2 beside = rim_corner(uv, rim_width(target.face.flags), corner);
+            mask inside = back && !rim && in_domain(beside);
+            if ((target.face.flags & kFaceNaturalBorder) == 0 && any_lane(inside))
+                inside = inside &&
+                         inside_loops(target, real2(min(beside.x, real(kUvBelowOne)), min(beside.y, real(kUvBelowOne))),
+                                      inside);
+            rim = rim || (back && !inside);
+        }
+        return rim;
     }
 
     bool was_tested(uint instance, uint patch)

@@ -1,6 +1,8 @@
 #include "runtime/cpu_lanes.h"
+#include "runtime/eye_side.h"
 #include "runtime/frame_effects.h"
 #include "runtime/thread_clock.h"
+#include "runtime/trace_one.h"
 #include "runtime/tracer.h"
 #include "runtime/trim_mode.h"
 
@@ -44,12 +46,6 @@ void add(WorkCounts& sum, const WorkCounts& part)
     sum.curve_tests += part.curve_tests;
     sum.uncertified_pixels += part.uncertified_pixels;
     sum.edge_tests += part.edge_tests;
-}
-
-/// The scene's own, or a new one.
-std::shared_ptr<const CpuScene> prepared(const Scene& scene)
-{
-    return scene.prepared ? scene.prepared : std::make_shared<CpuScene>(scene.pack.image);
 }
 
 class CpuTracer final : public Tracer {
@@ -111,8 +107,11 @@ private:
     WorkCounts render_once(const RenderOptions& options, TrimMode trim, int threads, tbb::task_arena& arena,
                            Frame& frame)
     {
-        const View view = make_view(cpu_scene_->image, camera_rays(options.camera, options.width, options.height),
-                                    options.width, options.height);
+        const CameraRays rays = camera_rays(options.camera, options.width, options.height);
+        View view = make_view(cpu_scene_->image, rays, options.width, options.height);
+        const std::vector<uint8_t> outside = seen_from_outside(*cpu_scene_, rays.eye);
+        for (size_t i = 0; i < outside.size(); ++i)
+            view.instances[i].outside = outside[i] != 0;
         BlockJob job{*cpu_scene_, view, options.width, options.height, trim, options.shade, options.error_px};
         if (trim == TrimMode::Kd)
             job.kd = &*cpu_scene_->kd_trims();
@@ -195,15 +194,21 @@ Result<std::unique_ptr<Tracer>> make_cpu_tracer(std::shared_ptr<const Scene> sce
 
 RayHit trace_ray(const Scene& scene, const std::array<double, 3>& origin_mm, const std::array<double, 3>& direction)
 {
+    return trace_one(*prepared(scene), origin_mm, direction);
+}
+
+RayHit trace_one(const CpuScene& scene, const std::array<double, 3>& origin_mm, const std::array<double, 3>& direction,
+                 std::optional<uint32_t> instance)
+{
     RayHit result;
     std::string found;
     const TraceBlock trace_block = find_trace_block("", found);
     const bool has_direction = direction[0] != 0 || direction[1] != 0 || direction[2] != 0;
     if (!trace_block || !has_direction)
         return result;
-    const auto cpu_scene = prepared(scene);
-    const View view = make_single_ray_view(scene.pack.image, origin_mm, direction);
-    const BlockJob job{*cpu_scene, view, 1, 1, TrimMode::Exact, false, 0.02f};
+    View view = make_single_ray_view(scene.image, origin_mm, direction);
+    view.alone = instance;
+    const BlockJob job{scene, view, 1, 1, TrimMode::Exact, false, 0.02f};
     Frame frame;
     resize(frame, 1, 1);
     const auto scratch = std::make_unique<BlockScratch>();

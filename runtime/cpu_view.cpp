@@ -167,6 +167,29 @@ void walk(const BvhNode* nodes, const Frustum& frustum, std::vector<uint32_t>& s
     }
 }
 
+/// The box that the children of the part's root fill.
+CpuScene::PartBox part_box(const PackImage& image, const PartRecord& part)
+{
+    CpuScene::PartBox box{{1, 1, 1}, {-1, -1, -1}, false}; // empty
+    if (part.node_count == 0)
+        return box;
+    const BvhNode& root = image.part_nodes[part.first_node];
+    for (int c = 0; c < 3; ++c) {
+        const double step = std::ldexp(1.0, int(root.exponents >> 8 * c & 0xffu) - 127);
+        uint lo = 255, hi = 0;
+        for (int i = 0; i < 4; ++i)
+            if (root.child[i] != kBvhEmpty) {
+                lo = std::min(lo, root.lo[c] >> 8 * i & 0xffu);
+                hi = std::max(hi, root.hi[c] >> 8 * i & 0xffu);
+            }
+        box.lo[c] = double(root.origin[c]) + step * lo;
+        box.hi[c] = double(root.origin[c]) + step * hi;
+    }
+    for (uint f = part.first_face; f < part.first_face + part.face_count; ++f)
+        box.has_rims = box.has_rims || (image.faces[f].flags & kFaceRims) != 0;
+    return box;
+}
+
 /// Where a leaf's box appears on the picture; false: not within the rectangle.
 bool project_box(const CpuScene::LeafBounds& box, const InstanceView& view, const PixelRect& rect, double tau_ref,
                  Candidate& out)
@@ -241,17 +264,24 @@ CpuScene::CpuScene(const PackImage& pack) : image(pack)
             shared_patch[leaf.patch] = 1;
         seen[leaf.patch] = 1;
     }
+    for (const PartRecord& part : pack.parts)
+        part_boxes.push_back(part_box(pack, part));
     for (const FaceRecord& face : pack.faces)
         face_color.push_back(linear_color(face.color_rgba));
     for (const InstanceRecord& instance : pack.instances)
         instance_color.push_back(linear_color(instance.color_rgba >> 24 != 0 ? instance.color_rgba : kDefaultColor));
 }
 
+std::shared_ptr<const CpuScene> prepared(const Scene& scene)
+{
+    return scene.prepared ? scene.prepared : std::make_shared<CpuScene>(scene.pack.image);
+}
+
 size_t CpuScene::bytes() const
 {
     return leaf_bounds.size() * sizeof(LeafBounds) +
            (face_color.size() + instance_color.size()) * sizeof(face_color[0]) + left_handed.size() +
-           shared_patch.size();
+           shared_patch.size() + part_boxes.size() * sizeof(PartBox);
 }
 
 const Result<KdTrims>& CpuScene::kd_trims() const
@@ -325,8 +355,8 @@ void collect_candidates(const CpuScene& scene, const View& view, const PixelRect
                 out.push_back(candidate);
         });
     };
-    if (image.instances.size() == 1) {
-        enter(0);
+    if (view.alone || image.instances.size() == 1) {
+        enter(view.alone.value_or(0));
     } else if (!image.top_nodes.empty()) {
         // the world's unit space seen as an instance
         InstanceRecord world{};

@@ -13,6 +13,7 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <vector>
@@ -33,6 +34,12 @@ struct CpuScene {
     std::vector<std::array<float, 3>> instance_color;
     std::vector<uint8_t> left_handed;  // patches whose axes are a mirror image
     std::vector<uint8_t> shared_patch; // native patches with several leaves
+    /// A box around a part's leaves, part units.
+    struct PartBox {
+        double lo[3], hi[3];
+        bool has_rims; // a face of the part has one
+    };
+    std::vector<PartBox> part_boxes;
     size_t bytes() const;
 
     /// The kd-trees of the pack's trims, built when first asked for. Fails: as derive_kd.
@@ -43,6 +50,9 @@ private:
     mutable std::optional<Result<KdTrims>> kd_;
 };
 
+/// The scene's own, or a new one.
+std::shared_ptr<const CpuScene> prepared(const Scene& scene);
+
 /// The view seen from one instance's part.
 struct InstanceView {
     double eye[3]; // part units
@@ -50,13 +60,15 @@ struct InstanceView {
     double k; // tau_part = k * tau
     // tau, tau x and tau y of a point p are rows of the inverse of (w0, step_x, step_y) times p - eye
     double row_tau[3], row_x[3], row_y[3];
-    float normal[3][3]; // part to world, for normals: inverse transpose, any length
+    float normal[3][3];   // part to world, for normals: inverse transpose, any length
+    bool outside = false; // seen_from_outside
 };
 
 struct View {
     double eye_mm[3], w0[3], step_x[3], step_y[3]; // world
     double tau_ref = 0;                            // mm; distances are stored relative to this. A float's value
     std::vector<InstanceView> instances;
+    std::optional<uint32_t> alone; // the only instance that rays meet
 };
 
 /// Rays of a camera. x runs from -width / 2 to width / 2.

@@ -114,7 +114,8 @@ Result<std::unique_ptr<Tracer>> make_cpu_tracer(std::shared_ptr<const Scene> sce
 Result<std::unique_ptr<Tracer>> make_vulkan_tracer(std::shared_ptr<const Scene> scene, bool allow_software,
                                                    bool validation);
 
-/// One ray, in world mm; `direction` need not be unit, distance_mm is along the unit direction.
+/// One ray, in world mm; `direction` need not be unit, distance_mm is along the unit direction. It meets backs wherever
+/// a face lies, in the rims of closed shells too, which a picture from outside does not show.
 struct RayHit {
     bool hit = false;
     double distance_mm = 0;

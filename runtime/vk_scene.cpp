@@ -1,5 +1,6 @@
 #include "runtime/vk_scene.h"
 
+#include "runtime/eye_side.h"
 #include "runtime/frame_effects.h"
 
 #include <fmt/format.h>
@@ -144,9 +145,12 @@ SceneFacts scene_facts(const PackImage& image)
             facts.features |= kFeatureRational;
         facts.largest_net_floats = std::max(facts.largest_net_floats, points * (rational ? 4u : 3u));
     }
-    for (const FaceRecord& face : image.faces)
+    for (const FaceRecord& face : image.faces) {
         if ((face.flags & kFaceNaturalBorder) == 0)
             facts.features |= kFeatureTrims;
+        if ((face.flags & kFaceRims) != 0)
+            facts.features |= kFeatureRims;
+    }
     uint32_t part_depth = 1;
     for (const PartRecord& part : image.parts)
         part_depth =
@@ -193,8 +197,9 @@ Status upload_kd(VulkanDevice& device, const KdTrims& kd, std::array<VulkanBuffe
     return upload_arrays(device, arrays, buffers);
 }
 
-Result<FrameSetup> frame_setup(const PackImage& image, const RenderOptions& options)
+Result<FrameSetup> frame_setup(const CpuScene& scene, const RenderOptions& options)
 {
+    const PackImage& image = scene.image;
     const CameraRays rays = camera_rays(options.camera, options.width, options.height);
     const double middle[2] = {0.5 * options.width, 0.5 * options.height};
     const Vec3 through_middle = rays.corner + rays.step_x * middle[0] + rays.step_y * middle[1];
@@ -226,6 +231,7 @@ Result<FrameSetup> frame_setup(const PackImage& image, const RenderOptions& opti
     view.line_classes = query.line_classes;
     view.tau_ref = nearest_tau(image, rays.eye, setup.w0);
 
+    const std::vector<uint8_t> outside = seen_from_outside(scene, rays.eye);
     setup.instances.resize(std::max<size_t>(image.instances.size(), 1));
     for (size_t i = 0; i < image.instances.size(); ++i) {
         const InstanceRecord& record = image.instances[i];
@@ -262,6 +268,7 @@ Result<FrameSetup> frame_setup(const PackImage& image, const RenderOptions& opti
         instance.first_node = part.node_count > 0 ? part.first_node : static_cast<uint32_t>(image.part_nodes.size());
         instance.first_leaf = part.first_leaf;
         instance.color_rgba = record.color_rgba;
+        instance.outside = outside[i];
     }
     return setup;
 }

@@ -4,6 +4,7 @@
 #include "format/derive_kd.h"
 #include "format/result.h"
 #include "runtime/camera.h"
+#include "runtime/cpu_view.h"
 #include "runtime/tracer.h"
 #include "runtime/vk_buffer.h"
 #include "runtime/vk_device.h"
@@ -18,7 +19,7 @@ namespace trimray {
 /// What the pack holds, as far as the shader cares.
 struct SceneFacts {
     uint32_t kinds = 0;              // bit kKind...
-    uint32_t features = 0;           // kFeatureTrims, kFeatureRational
+    uint32_t features = 0;           // kFeatureTrims, kFeatureRational, kFeatureRims
     uint32_t stack_size = 0;         // waiting children at most, top tree and deepest part together
     uint32_t largest_net_floats = 0; // of a Bezier patch
 };
@@ -38,6 +39,6 @@ struct FrameSetup {
     std::array<double, 3> w0{}, step_x{}, step_y{};
 };
 /// Fails: InvalidPack (an instance whose transform has no inverse).
-Result<FrameSetup> frame_setup(const PackImage& image, const RenderOptions& options);
+Result<FrameSetup> frame_setup(const CpuScene& scene, const RenderOptions& options);
 
 } // namespace trimray

@@ -56,7 +56,8 @@ struct QueryPool {
 class VulkanTracer : public Tracer {
 public:
     VulkanTracer(std::shared_ptr<const Scene> scene, std::unique_ptr<VulkanDevice> device)
-        : device_(std::move(device)), scene_(std::move(scene)), facts_(scene_facts(scene_->pack.image))
+        : device_(std::move(device)), scene_(std::move(scene)), cpu_scene_(prepared(*scene_)),
+          facts_(scene_facts(scene_->pack.image))
     {
     }
 
@@ -87,6 +88,7 @@ private:
 
     std::unique_ptr<VulkanDevice> device_; // first: everything below must be gone before it
     std::shared_ptr<const Scene> scene_;
+    std::shared_ptr<const CpuScene> cpu_scene_; // which side of shells the eye is on is found on the CPU
     SceneFacts facts_;
     size_t kd_bytes_ = 0; // of the kd-trees on the device; 0: none yet
     std::array<VulkanBuffer, kFrameBindings> buffers_;
@@ -481,7 +483,7 @@ Result<Frame> VulkanTracer::render(const RenderOptions& options, RenderStats& st
 
     if (const Status ready = upload_trims(*trim); !ready)
         return ready.error();
-    const Result<FrameSetup> setup = frame_setup(scene_->pack.image, options);
+    const Result<FrameSetup> setup = frame_setup(*cpu_scene_, options);
     if (!setup)
         return setup.error();
     if (const Status ready = prepare_frame(*setup, rows_per_band); !ready)

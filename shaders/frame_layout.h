@@ -53,6 +53,7 @@ struct FrameInstance {
     uint first_node; // of the part, in all parts' nodes
     uint first_leaf;
     uint color_rgba; // sRGB bytes; alpha 0: the default
+    uint outside;    // 1: rims of the part's faces show no backs (seen_from_outside)
 };
 
 struct FramePixel {
@@ -96,6 +97,7 @@ TRIMRAY_CONST uint kFeatureRational = 2u; // some Bezier patch is rational
 TRIMRAY_CONST uint kFeatureShade = 4u;
 TRIMRAY_CONST uint kFeatureCount = 8u;  // work counts are wanted
 TRIMRAY_CONST uint kFeatureEdges = 16u; // edge words of each pixel are wanted
+TRIMRAY_CONST uint kFeatureRims = 32u;  // some face has a rim
 
 TRIMRAY_CONST uint kGroupSide = 8u; // workgroups are 8 x 8 pixels
 
@@ -125,7 +127,7 @@ TRIMRAY_CONST uint kFrameBindings = 20u;
 
 #ifdef __cplusplus
 static_assert(sizeof(FrameView) == 108);
-static_assert(sizeof(FrameInstance) == 140);
+static_assert(sizeof(FrameInstance) == 144);
 static_assert(sizeof(FramePixel) == 52);
 } // namespace trimray
 #endif

@@ -134,6 +134,26 @@ bool inside_trims(uint face_id, FaceRecord face, vec2 uv)
     }
 }
 
+// The patch's normal S_u x S_v outwards: in left-handed axes S_u x S_v is the mirror image of the formula's
+vec3 outward(PatchRecord patch, FaceRecord face, vec3 n)
+{
+    bool left_handed = dot(cross(vector(patch.axis_x), vector(patch.axis_y)), vector(patch.axis_z)) < 0.0f;
+    bool reversed = (face.flags & kFaceReversed) != 0u;
+    return left_handed != reversed ? -n : n;
+}
+
+// Whether a point inside the face lies in its rim (shaders/shared/rim.h)
+bool in_rim(uint face_id, FaceRecord face, vec2 uv)
+{
+    vec2 width = rim_width(face.flags);
+    for (int corner = 0; corner < kRimCorners; ++corner) {
+        vec2 beside = rim_corner(uv, width, corner);
+        if (!in_domain(beside) || !inside_trims(face_id, face, min(beside, vec2(kUvBelowOne))))
+            return true;
+    }
+    return false;
+}
+
 // In front of the eye and not behind the nearest hit
 bool in_range(PatchRay ray, float t, Hit hit)
 {
@@ -142,9 +162,10 @@ bool in_range(PatchRay ray, float t, Hit hit)
 }
 
 // Takes the root at t if it is in the face's domain, inside its trims and nearer than what was found. Of two hits
-// within rounding the one of the lower instance and leaf stays, whatever the order.
+// within rounding the one of the lower instance and leaf stays, whatever the order. `rim`: it counts only beside the
+// face's rim.
 void offer(PatchRay ray, uint face_id, FaceRecord face, uint leaf, uint instance, float t, vec2 uv_patch, vec2 uv_face,
-           inout Hit hit)
+           bool rim, inout Hit hit)
 {
     vec2 off = abs(uv_face - 0.5f);
     if (max(off.x, off.y) > 0.5f + kDomainSlack)
@@ -154,7 +175,7 @@ void offer(PatchRay ray, uint face_id, FaceRecord face, uint leaf, uint instance
     if (!(past < hit.past + (first ? ray.slack : -ray.slack)))
         return;
     vec2 uv = clamp(uv_face, vec2(0.0f), vec2(kUvBelowOne));
-    if (!inside_trims(face_id, face, uv))
+    if (!inside_trims(face_id, face, uv) || (rim && in_rim(face_id, face, uv)))
         return;
     hit.past = past;
     hit.t = t;
@@ -181,6 +202,23 @@ vec2 native_uv(uint kind, PatchRecord patch, vec3 p)
     }
 }
 
+// Normal of a native surface at a point in patch space, of any length
+vec3 native_normal(uint kind, PatchRecord patch, vec3 p)
+{
+    switch (kind) {
+    case kKindCylinder:
+        return cylinder_normal(p);
+    case kKindCone:
+        return cone_normal(patch.param[0], patch.param[1], p);
+    case kKindSphere:
+        return sphere_normal(p);
+    case kKindTorus:
+        return torus_normal(patch.param[0], patch.param[1], p);
+    default:
+        return plane_normal();
+    }
+}
+
 vec2 face_uv(PatchRecord patch, uint kind, vec2 uv_patch)
 {
     vec2 scale = vec2(patch.uv_scale[0], patch.uv_scale[1]);
@@ -190,7 +228,8 @@ vec2 face_uv(PatchRecord patch, uint kind, vec2 uv_patch)
     return vec2(uv.x, wrapped ? uv.y + 2.0f * kPi * scale.y : uv.y);
 }
 
-void native_hit(PatchRay ray, PatchRecord patch, FaceRecord face, uint kind, uint leaf, uint instance, inout Hit hit)
+void native_hit(PatchRay ray, PatchRecord patch, FaceRecord face, uint kind, uint leaf, uint instance, bool rims,
+                inout Hit hit)
 {
     float r = patch.param[0];
     float second = patch.param[1];
@@ -214,8 +253,10 @@ void native_hit(PatchRay ray, PatchRecord patch, FaceRecord face, uint kind, uin
     for (int i = 0; i < 4; ++i) {
         if (!in_range(ray, roots[i], hit))
             continue;
-        vec2 uv_patch = native_uv(kind, patch, ray.origin + roots[i] * ray.direction);
-        offer(ray, patch.face, face, leaf, instance, roots[i], uv_patch, face_uv(patch, kind, uv_patch), hit);
+        vec3 p = ray.origin + roots[i] * ray.direction;
+        vec2 uv_patch = native_uv(kind, patch, p);
+        bool back = rims && dot(ray.direction, outward(patch, face, native_normal(kind, patch, p))) > 0.0f;
+        offer(ray, patch.face, face, leaf, instance, roots[i], uv_patch, face_uv(patch, kind, uv_patch), back, hit);
     }
     iterations += 4u;
 }
@@ -241,6 +282,7 @@ struct NewtonPatch {
     float enough;   // residual of the last step but one, patch units
     float box_past; // where the leaf's box begins
     uint work;      // loop iterations of a step
+    bool rims;      // the face has a rim, and the eye sees it from outside
     RayPlanes planes;
 };
 
@@ -259,8 +301,10 @@ bool newton_from(PatchRay ray, PatchRecord patch, FaceRecord face, LeafBox box, 
         if (settled) {
             // not `precise`: glslc follows precise values around this loop for ever
             float t = dot(s.p - ray.origin, ray.direction) / dot(ray.direction, ray.direction);
-            if (next.residual <= max(newton.enough, kSmallResidual) && in_range(ray, t, hit))
-                offer(ray, patch.face, face, leaf, instance, t, uv, face_uv(patch, kKindBezier, uv), hit);
+            if (next.residual <= max(newton.enough, kSmallResidual) && in_range(ray, t, hit)) {
+                bool back = newton.rims && dot(ray.direction, outward(patch, face, cross(s.du, s.dv))) > 0.0f;
+                offer(ray, patch.face, face, leaf, instance, t, uv, face_uv(patch, kKindBezier, uv), back, hit);
+            }
             return grazing;
         }
         ++newton_steps;
@@ -287,7 +331,7 @@ bool newton_from(PatchRay ray, PatchRecord patch, FaceRecord face, LeafBox box, 
 
 // Newton from the leaf's middle, and from its other starts where it may hold more roots than one
 void bezier_hit(PatchRay ray, PatchRecord patch, FaceRecord face, LeafBox box, float box_past, uint leaf, uint instance,
-                inout Hit hit)
+                bool rims, inout Hit hit)
 {
     NewtonPatch newton;
     newton.degree_u = (patch.shape >> 8) & 0xffu;
@@ -299,6 +343,7 @@ void bezier_hit(PatchRay ray, PatchRecord patch, FaceRecord face, LeafBox box, f
     newton.enough = last_residual(view.error_px * ray.pixel);
     newton.box_past = box_past;
     newton.work = 1u + bezier_iterations(newton.degree_u, newton.degree_v);
+    newton.rims = rims;
     vec2 uv = 0.5f * (box.uv_lo + box.uv_hi);
     bool again = (box.flags & kLeafFlagged) != 0u;
     for (int start = 0; start <= kMoreStarts; ++start) {
@@ -330,9 +375,10 @@ void leaf_hit(uint leaf, uint instance_index, FrameInstance instance, vec2 pixel
         return;
     uint kind = patch.shape & 0xffu;
     FaceRecord face = faces[patch.face];
+    bool rims = has_feature(kFeatureRims) && instance.outside != 0u && (face.flags & kFaceRims) != 0u;
     if (kind == kKindBezier) {
         if (has_kind(kKindBezier))
-            bezier_hit(ray, patch, face, box, ray.past + in_box.near, leaf, instance_index, hit);
+            bezier_hit(ray, patch, face, box, ray.past + in_box.near, leaf, instance_index, rims, hit);
     } else
-        native_hit(ray, patch, face, kind, leaf, instance_index, hit);
+        native_hit(ray, patch, face, kind, leaf, instance_index, rims, hit);
 }

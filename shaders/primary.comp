@@ -19,6 +19,7 @@
 #include "shaders/shared/patch_newton.h"
 #include "shaders/shared/precision.h"
 #include "shaders/shared/quadric.h"
+#include "shaders/shared/rim.h"
 #include "shaders/shared/shading.h"
 #include "shaders/shared/torus.h"
 #include "shaders/shared/trim_kd.h"
@@ -193,26 +194,12 @@ vec3 world_normal(Hit hit, FrameInstance instance, PatchRecord patch, FaceRecord
     uint kind = patch.shape & 0xffu;
     PatchRay ray = patch_ray(instance, patch, pixel);
     vec3 p = ray.origin + hit.t * ray.direction;
-    float r = patch.param[0];
-    float second = patch.param[1];
-    vec3 n = plane_normal();
+    vec3 n;
     if (kind == kKindBezier && has_kind(kKindBezier))
         n = bezier_normal(patch, hit.uv_patch);
-    else if (kind == kKindCylinder && has_kind(kKindCylinder))
-        n = cylinder_normal(p);
-    else if (kind == kKindCone && has_kind(kKindCone))
-        n = cone_normal(r, second, p);
-    else if (kind == kKindSphere && has_kind(kKindSphere))
-        n = sphere_normal(p);
-    else if (kind == kKindTorus && has_kind(kKindTorus))
-        n = torus_normal(r, second, p);
-    vec3 axis_x = vector(patch.axis_x);
-    vec3 axis_y = vector(patch.axis_y);
-    vec3 axis_z = vector(patch.axis_z);
-    // in left-handed axes S_u x S_v is the mirror image of the formula's
-    bool left_handed = dot(cross(axis_x, axis_y), axis_z) < 0.0f;
-    bool reversed = (face.flags & kFaceReversed) != 0u;
-    n = combine(axis_x, axis_y, axis_z, left_handed != reversed ? -n : n);
+    else
+        n = native_normal(kind, patch, p);
+    n = combine(vector(patch.axis_x), vector(patch.axis_y), vector(patch.axis_z), outward(patch, face, n));
     return combine(vector(instance.normal_x), vector(instance.normal_y), vector(instance.normal_z), n);
 }
 

@@ -93,7 +93,7 @@ int measure(const std::string& path, const Request& request)
                     refused = true;
                     break;
                 }
-                const hard::LeakCount count = from.closed.count(render, *frame, view.inside);
+                const hard::LeakCount count = from.closed.count(render, *frame, view.inside, nullptr);
                 (view.inside ? inside : view.camera.fov_deg < 29 ? close : wide) += count;
             }
             fmt::print("{:<40} {:<6} {:<5} gap {:.1e} tol {:.1e} mm | wide {:>5} + {:<5} of {:<9} close {:>5} + {:<6} "

@@ -1,6 +1,7 @@
 // Leaks counted in pictures of closed solids: from outside every first hit shows the front of a face, from inside every
-// ray meets one. What breaks that is a leak, unless it lies at a border: where two faces meet at an angle, each reaches
-// beyond the other by what its border was moved outwards, and that rim shows its back.
+// ray meets one. What breaks that is a leak; at a face's border it counts as a rim: where two faces meet at an angle,
+// each reaches beyond the other by what its border was moved outwards, and there its back could be seen. And what the
+// true picture shows must be there: a ray that passes through it found a hole.
 #pragma once
 
 #include "format/derive.h"
@@ -47,6 +48,7 @@ struct LeakCount {
         0;            // from outside: backs of faces away from any border; from inside: misses, and fronts away from it
     int64_t rims = 0; // the other side of a face than a closed solid shows, at that face's border
     int64_t grazing = 0; // or where the ray grazes it: a tangent's two roots are one front and one back
+    int64_t holes = 0;   // from outside: no hit, or one well behind the true picture's, which shows a front
 
     LeakCount& operator+=(const LeakCount& other)
     {
@@ -54,6 +56,7 @@ struct LeakCount {
         leaks += other.leaks;
         rims += other.rims;
         grazing += other.grazing;
+        holes += other.holes;
         return *this;
     }
 };
@@ -61,7 +64,7 @@ struct LeakCount {
 /// A closed solid, or several, to look at.
 class ClosedModel {
 public:
-    /// `rim_mm`: how near its face's border a hit counts as a rim.
+    /// `rim_mm`: how near its face's border a hit counts as a rim, and how far behind the true one it may lie.
     ClosedModel(std::shared_ptr<const Scene> scene, double rim_mm)
         : scene_(std::move(scene)), reference_(scene_->pack.image), rim_mm_(rim_mm)
     {
@@ -69,7 +72,8 @@ public:
 
     const Scene& scene() const { return *scene_; }
 
-    LeakCount count(const RenderOptions& options, const Frame& frame, bool from_inside) const
+    /// `truth`: the same picture of the model as it should be; null: not known.
+    LeakCount count(const RenderOptions& options, const Frame& frame, bool from_inside, const Frame* truth) const
     {
         const CameraRays rays = camera_rays(options.camera, options.width, options.height);
         LeakCount count;
@@ -77,13 +81,14 @@ public:
             for (uint32_t x = 0; x < frame.width; ++x) {
                 const size_t i = size_t(y) * frame.width + x;
                 ++count.rays;
+                count.holes += truth && !from_inside && truth->face[i] >= 0 &&
+                               facing_of(rays, *truth, x, y) < -kGrazing &&
+                               (frame.face[i] < 0 || frame.depth_mm[i] > truth->depth_mm[i] + rim_mm_);
                 if (frame.face[i] < 0) {
                     count.leaks += from_inside;
                     continue;
                 }
-                const Point along = rays.corner + (x + 0.5) * rays.step_x + (y + 0.5) * rays.step_y;
-                const Point normal{frame.normal[3 * i], frame.normal[3 * i + 1], frame.normal[3 * i + 2]};
-                const double facing = dot(along, normal) / std::sqrt(dot(along, along));
+                const double facing = facing_of(rays, frame, x, y);
                 if ((facing <= 0) != from_inside)
                     continue;
                 if (std::abs(facing) < kGrazing) {
@@ -96,6 +101,14 @@ public:
     }
 
 private:
+    /// Cosine of the angle between the ray and the outward normal; below 0: a front.
+    static double facing_of(const CameraRays& rays, const Frame& frame, uint32_t x, uint32_t y)
+    {
+        const float* n = &frame.normal[3 * (size_t(y) * frame.width + x)];
+        const Point along = rays.corner + (x + 0.5) * rays.step_x + (y + 0.5) * rays.step_y;
+        return dot(along, {n[0], n[1], n[2]}) / std::sqrt(dot(along, along));
+    }
+
     bool at_border(uint32_t id, double u_file, double v_file) const
     {
         const FaceRecord& face = scene_->pack.image.faces[id];
