@@ -62,7 +62,7 @@ public:
                         packet.x = load(offset_x) + real(float(x));
                         packet.y = load(offset_y) + real(float(y));
                         packet.alive = packet.x < float(tile.x1) - middle_x && packet.y < float(tile.y1) - middle_y;
-                        const PacketHit hit = trace_packet(packet, pixel_rect({x, y, x + 4, y + 4}));
+                        const PacketHit hit = trace_twice(packet, pixel_rect({x, y, x + 4, y + 4}));
                         write_packet(job_, packet, hit, x - block.x0, y - strip_y0, scratch_.strip, work_);
                         if (has_borders)
                             edges_.find(packet, hit, x, y, &scratch_.strip.rgba[y - strip_y0][4 * (x - block.x0)]);
@@ -113,6 +113,17 @@ private:
         }
     }
 
+    /// A rim's back counts as a surface first, for few rays meet one: where it is what they see they are traced again.
+    HWY_ATTR PacketHit trace_twice(const Packet& packet, const PixelRect& rect)
+    {
+        rims_cut_ = false;
+        const PacketHit hit = trace_packet(packet, rect);
+        if (!any_lane(hit.back))
+            return hit;
+        rims_cut_ = true;
+        return trace_packet(packet, rect);
+    }
+
     HWY_ATTR PacketHit trace_packet(const Packet& packet, const PixelRect& rect)
     {
         PacketHit hit;
@@ -121,6 +132,7 @@ private:
         hit.instance = integer(~0u);
         hit.uv_face = real2(real(0.0f), real(0.0f));
         hit.normal = real3(real(0.0f), real(0.0f), real(1.0f));
+        hit.back = mask(false);
         hit.doubt = real(kHuge);
         float farthest = kHuge;
         recent_count_ = 0;
@@ -339,6 +351,11 @@ private:
         return patch.evaluate(source_, patch.first_control_point, patch.degree_u, patch.degree_v, uv);
     }
 
+    HWY_ATTR static real2 clamp_to_domain(real2 uv)
+    {
+        return real2(clamp(uv.x, real(0.0f), real(kUvBelowOne)), clamp(uv.y, real(0.0f), real(kUvBelowOne)));
+    }
+
     /// Takes the roots that lie in the face's domain and inside its trims.
     HWY_ATTR HWY_INLINE void offer(Target& target, mask near, real t, real2 uv_patch, real3 normal, PacketHit& hit)
     {
@@ -353,7 +370,7 @@ private:
         mask taken = near && abs(uv.x - 0.5f) <= 0.5f + kDomainSlack && abs(uv.y - 0.5f) <= 0.5f + kDomainSlack;
         if (!any_lane(taken))
             return;
-        uv = real2(clamp(uv.x, real(0.0f), real(kUvBelowOne)), clamp(uv.y, real(0.0f), real(kUvBelowOne)));
+        uv = clamp_to_domain(uv);
         // of two hits within rounding the one of the lower instance and leaf stays, whatever the order
         const real at = target.view.base_mm + target.view.mm_per_t * t;
         const integer leaf(target.candidate.leaf), instance(target.candidate.instance);
@@ -366,16 +383,21 @@ private:
             if (!any_lane(taken))
                 return;
         }
+        mask back(false);
         if (target.rim) {
-            taken = taken && !in_rim(target, taken, uv, normal);
-            if (!any_lane(taken))
-                return;
+            back = meets_back(target, normal);
+            if (rims_cut_ && any_lane(taken && back)) {
+                taken = taken && !in_rim(target, taken && back, uv);
+                if (!any_lane(taken))
+                    return;
+            }
         }
         hit.best = select(taken, at, hit.best);
         hit.leaf = select(taken, leaf, hit.leaf);
         hit.instance = select(taken, instance, hit.instance);
         hit.uv_face = select(taken, uv, hit.uv_face);
         hit.normal = select(taken, normal, hit.normal);
+        hit.back = select(taken, back, hit.back);
         target.changed = true;
     }
 
@@ -388,24 +410,26 @@ private:
                    : inside_trims(source_, job_.trim, face, target.face, uv, asked, work_.curve_tests);
     }
 
-    /// Lanes of `asked`, hits inside of the face, that show the back of its rim.
-    HWY_ATTR HWY_NOINLINE mask in_rim(const Target& target, mask asked, real2 uv, real3 normal)
+    /// Lanes that meet the face from behind.
+    HWY_ATTR mask meets_back(const Target& target, real3 normal) const
     {
-        const bool turned = ((target.face.flags & kFaceReversed) != 0) !=
-                            (job_.scene.left_handed[image_.leaves[target.candidate.leaf].patch] != 0);
-        const real facing = dot(target.direction, normal);
-        const mask back = asked && (turned ? facing < 0.0f : facing > 0.0f);
-        mask rim(false);
-        for (int corner = 0; corner < kRimCorners && any_lane(back && !rim); ++corner) {
-            const real2 beside = rim_corner(uv, rim_width(target.face.flags), corner);
-            mask inside = back && !rim && in_domain(beside);
-            if ((target.face.flags & kFaceNaturalBorder) == 0 && any_lane(inside))
-                inside = inside &&
-                         inside_loops(target, real2(min(beside.x, real(kUvBelowOne)), min(beside.y, real(kUvBelowOne))),
-                                      inside);
-            rim = rim || (back && !inside);
+        const uint patch = image_.leaves[target.candidate.leaf].patch;
+        const bool turned = ((target.face.flags & kFaceReversed) != 0) != (job_.scene.left_handed[patch] != 0);
+        const real along = dot(target.direction, normal);
+        return turned ? along < 0.0f : along > 0.0f;
+    }
+
+    /// Lanes of `asked`, hits inside of the face, that lie in its rim.
+    HWY_ATTR HWY_NOINLINE mask in_rim(const Target& target, mask asked, real2 uv)
+    {
+        mask beside_rim = asked;
+        for (int corner = 0; corner < kRimCorners && any_lane(beside_rim); ++corner) {
+            const real2 q = rim_corner(uv, rim_width(target.face.flags), corner);
+            beside_rim = beside_rim && in_domain(q);
+            if ((target.face.flags & kFaceNaturalBorder) == 0 && any_lane(beside_rim))
+                beside_rim = beside_rim && inside_loops(target, clamp_to_domain(q), beside_rim);
         }
-        return rim;
+        return asked && !beside_rim;
     }
 
     bool was_tested(uint instance, uint patch)
@@ -429,6 +453,7 @@ private:
     size_t tile_count_ = 0;
     uint64_t recent_[8];
     uint recent_count_ = 0;
+    bool rims_cut_ = false; // rims are no surface
 };
 
 SHARED_CLOSE

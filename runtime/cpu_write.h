@@ -25,6 +25,7 @@ struct PacketHit {
     integer instance; // ~0: none
     real2 uv_face;
     real3 normal; // S_u x S_v in patch space, right-handed axes, any length
+    mask back;    // it may be a rim's
     real doubt;   // where the nearest leaf begins whose Newton did not settle, as `best`; kHuge: none
 };
 

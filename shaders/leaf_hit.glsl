@@ -19,7 +19,11 @@ struct Hit {
     uint leaf;
     uint instance;
     float doubt; // where the nearest leaf begins whose Newton did not settle, as `past`; kHuge: none
+    bool back;   // it may be a rim's
 };
+
+// A rim's back counts as a surface first, for few rays meet one: where it is what they see they are traced again.
+bool rims_cut = false;
 
 // A point at t is origin + t * direction in patch space; t counts mm of tau.
 struct PatchRay {
@@ -142,16 +146,16 @@ vec3 outward(PatchRecord patch, FaceRecord face, vec3 n)
     return left_handed != reversed ? -n : n;
 }
 
-// Whether a point inside the face lies in its rim (shaders/shared/rim.h)
-bool in_rim(uint face_id, FaceRecord face, vec2 uv)
+// Whether a point is inside the face's trims and, if asked, beside its rim (shaders/shared/rim.h)
+bool inside_face(uint face_id, FaceRecord face, vec2 uv, bool beside_rim)
 {
     vec2 width = rim_width(face.flags);
-    for (int corner = 0; corner < kRimCorners; ++corner) {
-        vec2 beside = rim_corner(uv, width, corner);
-        if (!in_domain(beside) || !inside_trims(face_id, face, min(beside, vec2(kUvBelowOne))))
-            return true;
+    for (int corner = beside_rim ? kRimCorners : 0; corner >= 0; --corner) {
+        vec2 q = corner > 0 ? rim_corner(uv, width, corner - 1) : uv;
+        if (!in_domain(q) || !inside_trims(face_id, face, min(q, vec2(kUvBelowOne))))
+            return false;
     }
-    return false;
+    return true;
 }
 
 // In front of the eye and not behind the nearest hit
@@ -162,10 +166,9 @@ bool in_range(PatchRay ray, float t, Hit hit)
 }
 
 // Takes the root at t if it is in the face's domain, inside its trims and nearer than what was found. Of two hits
-// within rounding the one of the lower instance and leaf stays, whatever the order. `rim`: it counts only beside the
-// face's rim.
+// within rounding the one of the lower instance and leaf stays, whatever the order. `back`: it may be a rim's.
 void offer(PatchRay ray, uint face_id, FaceRecord face, uint leaf, uint instance, float t, vec2 uv_patch, vec2 uv_face,
-           bool rim, inout Hit hit)
+           bool back, inout Hit hit)
 {
     vec2 off = abs(uv_face - 0.5f);
     if (max(off.x, off.y) > 0.5f + kDomainSlack)
@@ -175,9 +178,10 @@ void offer(PatchRay ray, uint face_id, FaceRecord face, uint leaf, uint instance
     if (!(past < hit.past + (first ? ray.slack : -ray.slack)))
         return;
     vec2 uv = clamp(uv_face, vec2(0.0f), vec2(kUvBelowOne));
-    if (!inside_trims(face_id, face, uv) || (rim && in_rim(face_id, face, uv)))
+    if (!inside_face(face_id, face, uv, back && rims_cut))
         return;
     hit.past = past;
+    hit.back = back;
     hit.t = t;
     hit.uv_face = uv;
     hit.uv_patch = uv_patch;

@@ -118,6 +118,8 @@ float hit_tau(Hit hit)
     return hit.past < kHuge ? tau + 4.0f * kRounding * abs(tau) : kHuge;
 }
 
+uint group_iterations = 0u; // of the whole subgroup, whose lanes share the driver's limit
+
 // Walks the trees until nothing nearer can wait. Returns false where the driver's loop limit would have cut it short.
 bool walk(vec2 pixel, vec3 across, inout Hit hit)
 {
@@ -126,7 +128,6 @@ bool walk(vec2 pixel, vec3 across, inout Hit hit)
     uint instance_index = 0u;
     FrameInstance instance;
     TreeRay ray = top_ray(across);
-    uint group_iterations = 0u; // of the whole subgroup, whose lanes share the driver's limit
     stack_top = 0u;
     push(Waiting(0.0f, 0u));
     while (stack_top > 0u) {
@@ -276,8 +277,15 @@ void main()
     if (active_here) {
         vec2 pixel = vec2(float(at.x) + 0.5f - view.middle[0], float(at.y + view.first_row) + 0.5f - view.middle[1]);
         vec3 across = pixel.x * vector(view.step_x) + pixel.y * vector(view.step_y);
-        Hit hit = Hit(kHuge, 0.0f, vec2(0.0f), vec2(0.0f), 0xffffffffu, 0xffffffffu, kHuge);
-        bool complete = walk(pixel, across, hit);
+        Hit hit;
+        bool complete;
+        for (int attempt = 0; attempt < 2; ++attempt) {
+            hit = Hit(kHuge, 0.0f, vec2(0.0f), vec2(0.0f), 0xffffffffu, 0xffffffffu, kHuge, false);
+            complete = walk(pixel, across, hit);
+            if (!complete || !hit.back || rims_cut)
+                break;
+            rims_cut = true;
+        }
         FramePixel result = miss_pixel(hit.doubt < kHuge);
         if (hit.past < kHuge)
             result = hit_pixel(hit, pixel, across);

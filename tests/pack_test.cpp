@@ -367,6 +367,7 @@ std::vector<HostileEdit> hostile_edits()
         {3209, "leaf patch", [](M& m) { m.leaves[0].patch = 3; }},
         {3209, "patch face", [](M& m) { m.patches[0].face = 1; }},
         {3210, "singular", [](M& m) { m.instances[1].transform[0] = 0; }},
+        {3211, "a rim along u alone", [](M& m) { m.faces[1].flags |= 3u << kFaceRimBit; }},
         {3211, "face kind", [](M& m) { m.faces[1].surface_kind = 6; }},
         {3212, "part ranges", [](M& m) { m.parts[1].first_face = 2; }},
         {3212, "face patches", [](M& m) { m.faces[1].patch_count = 2; }},
