@@ -72,7 +72,7 @@ int measure(const std::string& path, const Request& request)
         if (!whole)
             return 1;
         if (views.empty())
-            views = hard::leak_views(*whole->tracer, *scene, bounds, request.around, request.close_ups, request.pixels);
+            views = hard::leak_views(*scene, bounds, request.around, request.close_ups, request.pixels);
         std::unique_ptr<Counted> within; // what the views from inside are in: all of them in one
         for (const hard::LeakView& view : views)
             if (view.inside && !within && !(within = counted(path, hard::alone(*scene, view.within), rim_mm)))

@@ -70,8 +70,8 @@ struct Counts {
     LeakCount outside, inside;
 };
 
-Counts count(Tracer& tracer, Tracer& truth, const ClosedModel& closed, const std::vector<LeakView>& views,
-             TrimMode mode, uint32_t pixels)
+Counts count(Tracer& tracer, Tracer& true_tracer, const PackImage& true_image, const ClosedModel& closed,
+             const std::vector<LeakView>& views, TrimMode mode, uint32_t pixels)
 {
     Counts counts;
     for (const LeakView& view : views) {
@@ -81,12 +81,13 @@ Counts count(Tracer& tracer, Tracer& truth, const ClosedModel& closed, const std
         options.trim = mode;
         options.shade = false;
         RenderStats stats;
-        const Result<Frame> frame = tracer.render(options, stats), true_frame = truth.render(options, stats);
+        const Result<Frame> frame = tracer.render(options, stats), true_frame = true_tracer.render(options, stats);
         if (!frame.ok() || !true_frame.ok()) {
             ADD_FAILURE() << (frame.ok() ? true_frame : frame).error().detail;
             return counts;
         }
-        (view.inside ? counts.inside : counts.outside) += closed.count(options, *frame, view.inside, &*true_frame);
+        const TruePicture truth{true_image, *true_frame};
+        (view.inside ? counts.inside : counts.outside) += closed.count(options, *frame, view.inside, &truth);
     }
     return counts;
 }
@@ -125,11 +126,11 @@ Leaks measure(const CadModel& model, const CadModel& truth, const std::string& n
         auto cpu = make_cpu_tracer(scene);
         EXPECT_TRUE(cpu.ok());
         if (views.empty())
-            views = leak_views(**cpu, *scene, bounds, 2, 4, pixels);
+            views = leak_views(*scene, bounds, 2, 4, pixels);
         EXPECT_GE(std::count_if(views.begin(), views.end(), [](const LeakView& view) { return view.inside; }), 6)
             << name;
         for (const TrimMode mode : {TrimMode::Exact, TrimMode::Hybrid}) {
-            const Counts counts = count(**cpu, **true_tracer, closed, views, mode, pixels);
+            const Counts counts = count(**cpu, **true_tracer, true_scene->pack.image, closed, views, mode, pixels);
             std::cout << fmt::format("{}, {}, borders {}: outside {} leaks, {} at rims, {} grazing, {} holes of {} "
                                      "rays; inside {} of {}\n",
                                      name, mode == TrimMode::Exact ? "exact" : "hybrid", grow ? "grown" : "as is",
@@ -148,7 +149,8 @@ Leaks measure(const CadModel& model, const CadModel& truth, const std::string& n
             continue;
         }
         for (const TrimMode mode : {TrimMode::Exact, TrimMode::Hybrid})
-            expect_tight(count(**vulkan, **true_tracer, closed, views, mode, kVulkanPixels), name + " vulkan");
+            expect_tight(count(**vulkan, **true_tracer, true_scene->pack.image, closed, views, mode, kVulkanPixels),
+                         name + " vulkan");
     }
     return leaks;
 }

@@ -61,6 +61,12 @@ struct LeakCount {
     }
 };
 
+/// A picture of the model as it should be.
+struct TruePicture {
+    const PackImage& image;
+    const Frame& frame;
+};
+
 /// A closed solid, or several, to look at.
 class ClosedModel {
 public:
@@ -72,8 +78,8 @@ public:
 
     const Scene& scene() const { return *scene_; }
 
-    /// `truth`: the same picture of the model as it should be; null: not known.
-    LeakCount count(const RenderOptions& options, const Frame& frame, bool from_inside, const Frame* truth) const
+    /// `truth`: of the same view; null: not known.
+    LeakCount count(const RenderOptions& options, const Frame& frame, bool from_inside, const TruePicture* truth) const
     {
         const CameraRays rays = camera_rays(options.camera, options.width, options.height);
         LeakCount count;
@@ -81,9 +87,7 @@ public:
             for (uint32_t x = 0; x < frame.width; ++x) {
                 const size_t i = size_t(y) * frame.width + x;
                 ++count.rays;
-                count.holes += truth && !from_inside && truth->face[i] >= 0 &&
-                               facing_of(rays, *truth, x, y) < -kGrazing &&
-                               (frame.face[i] < 0 || frame.depth_mm[i] > truth->depth_mm[i] + rim_mm_);
+                count.holes += truth && !from_inside && is_hole(rays, frame, *truth, x, y);
                 if (frame.face[i] < 0) {
                     count.leaks += from_inside;
                     continue;
@@ -101,6 +105,23 @@ public:
     }
 
 private:
+    /// Whether the true picture shows a front that is missing here, or well behind it. Not in what a tracer adds to a
+    /// domain's sides: there a hit is answered as the side's nearest point.
+    bool is_hole(const CameraRays& rays, const Frame& frame, const TruePicture& truth, uint32_t x, uint32_t y) const
+    {
+        const size_t i = size_t(y) * frame.width + x;
+        if (truth.frame.face[i] < 0 || !(facing_of(rays, truth.frame, x, y) < -kGrazing))
+            return false;
+        const FaceRecord& face = truth.image.faces[size_t(truth.frame.face[i])];
+        for (size_t c = 0; c < 2; ++c) {
+            const double at = double(truth.frame.uv[2 * i + c]),
+                         margin = 1e-6 * (face.domain_hi[c] - face.domain_lo[c]);
+            if (!(at > face.domain_lo[c] + margin && at < face.domain_hi[c] - margin))
+                return false;
+        }
+        return frame.face[i] < 0 || double(frame.depth_mm[i]) > double(truth.frame.depth_mm[i]) + rim_mm_;
+    }
+
     /// Cosine of the angle between the ray and the outward normal; below 0: a front.
     static double facing_of(const CameraRays& rays, const Frame& frame, uint32_t x, uint32_t y)
     {
@@ -186,9 +207,19 @@ inline Point point_of(const Frame& frame, const CameraRays& rays, uint32_t x, ui
 /// Views of a closed model: whole, from `around` directions; and for each of these close-ups of places where two faces
 /// meet in the picture, by a long lens (pixels of 1e-5 and 1e-6 of the diagonal) and from nearby; and six views of 90
 /// degrees each from a point within. Found by tracing, so they follow the model; the same every time.
-inline std::vector<LeakView> leak_views(Tracer& tracer, const Scene& scene, const Bounds& bounds, int around,
-                                        int close_ups, uint32_t pixels)
+/// They are looked for with the backs of rims on show, so that what is done about these does not move them.
+inline std::vector<LeakView> leak_views(const Scene& looked_at, const Bounds& bounds, int around, int close_ups,
+                                        uint32_t pixels)
 {
+    const auto copy = std::make_shared<Scene>();
+    copy->pack = looked_at.pack;
+    for (FaceRecord& face : copy->pack.image.faces)
+        face.flags &= ~kFaceRims;
+    const Scene& scene = *copy;
+    auto made = make_cpu_tracer(copy);
+    if (!made.ok())
+        return {};
+    Tracer& tracer = **made;
     constexpr double kFov = 30;
     const double diagonal = bounds.diagonal();
     std::mt19937 rng(7);
