@@ -141,7 +141,7 @@ CadPart convert_part(const PartShape& source, uint32_t part_index, const ImportO
         out.color_rgba = colors.IsBound(face) ? std::optional(colors.Find(face)) : source.color_rgba;
         part.faces.push_back(std::move(out));
     }
-    classify_edges(part);
+    classify_edges(part, diagonal_mm(shape));
     measure_border_gaps(part, diagonal_mm(shape));
     return part;
 }

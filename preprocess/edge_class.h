@@ -14,8 +14,11 @@ inline constexpr double kSmoothAngle_deg = 1;
 ///   a pole is a seam; so is an edge that one face uses twice where its surface closes, unless it is creased there;
 ///   an edge of two faces, or of one face on both sides, is smooth where they share their tangent planes, else sharp;
 ///   an edge of one face is free; one of three or more is sharp.
+/// Edges of one face each that lie on one another in space count as one: files of loose faces (IGES) share none. They
+/// do where their ends and three points between are as near as their tolerances, or kUnstatedGap (border_gap.h) of
+/// `size_mm`, the part's diagonal.
 /// Only faces of this part count, and only those that were converted: an edge whose other face was dropped is free.
 /// Where normals cannot be measured anywhere along an edge, CadEdge::smooth decides.
-void classify_edges(CadPart& part);
+void classify_edges(CadPart& part, double size_mm);
 
 } // namespace trimray

@@ -33,10 +33,10 @@ Counts edges_by_class(const CadModel& model)
     return counts;
 }
 
-CadModel solid(const std::string& name, bool native = true)
+CadModel solid(const std::string& name, bool native = true, const char* extension = "brep")
 {
     const std::filesystem::path path =
-        std::filesystem::temp_directory_path() / fmt::format("trimray-edges-{}.brep", getpid());
+        std::filesystem::temp_directory_path() / fmt::format("trimray-edges-{}.{}", getpid(), extension);
     EXPECT_TRUE(oracle::write_solid(name, path)) << name;
     ImportOptions options;
     options.native_surfaces = native;
@@ -61,6 +61,17 @@ TEST(edge_class, follows_the_angle_between_faces_and_their_number)
             EXPECT_EQ(edges_by_class(solid(name, native)), counts) << name << (native ? "" : " as splines");
 }
 
+TEST(edge_class, edges_of_loose_faces_that_lie_on_one_another_count_as_one)
+{
+    // as the edges of a file whose faces share none: each twice, but for poles and what ends a face
+    const std::map<std::string, Counts> expected{
+        {"box", {24, 0, 0, 0}}, {"rounded box", {0, 96, 8, 0}}, {"cylinder", {4, 0, 2, 0}},
+        {"tube", {0, 0, 2, 2}}, {"half tubes", {0, 4, 0, 4}},   {"three sheets", {3, 0, 0, 9}},
+    };
+    for (const auto& [name, counts] : expected)
+        EXPECT_EQ(edges_by_class(solid(name, true, "igs")), counts) << name;
+}
+
 TEST(edge_class, a_crease_of_two_degrees_is_sharp_and_one_of_half_a_degree_smooth)
 {
     for (const auto& [degrees, expected] : {std::pair(2.0, kEdgeSharp), std::pair(0.5, kEdgeSmooth)}) {
@@ -83,12 +94,12 @@ TEST(edge_class, a_crease_of_two_degrees_is_sharp_and_one_of_half_a_degree_smoot
             face.loops.push_back({use});
             part.faces.push_back(face);
         }
-        classify_edges(part);
+        classify_edges(part, 2);
         for (const CadFace& face : part.faces)
             EXPECT_EQ(face.loops[0][0].edge_class, expected) << degrees;
         // folded back onto each other: no less than 179 degrees
         part.faces[1].loops[0][0].reversed = true;
-        classify_edges(part);
+        classify_edges(part, 2);
         EXPECT_EQ(part.faces[0].loops[0][0].edge_class, kEdgeSharp) << degrees;
     }
 }

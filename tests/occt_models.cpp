@@ -30,6 +30,7 @@
 #include <Geom_RectangularTrimmedSurface.hxx>
 #include <Geom_SurfaceOfLinearExtrusion.hxx>
 #include <Geom_SurfaceOfRevolution.hxx>
+#include <IGESControl_Writer.hxx>
 #include <STEPControl_Reader.hxx>
 #include <Standard_Failure.hxx>
 #include <TColgp_Array1OfPnt.hxx>
@@ -69,6 +70,10 @@ TopoDS_Shape with_hole(const Handle(Geom_Surface) & surface, const gp_Ax2& drill
 
 bool write_shape(const TopoDS_Shape& shape, const std::string& path)
 {
+    if (path.ends_with(".igs")) { // the faces one by one: none shares an edge
+        IGESControl_Writer writer("MM", 0);
+        return writer.AddShape(shape) && writer.Write(path.c_str());
+    }
     return !shape.IsNull() && BRepTools::Write(shape, path.c_str());
 }
 

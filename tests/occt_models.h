@@ -25,7 +25,8 @@ bool write_unbounded_plane(const std::string& path);
 /// One shape of a file in a compound, at its own place and a second file's worth away at `scale` times its size.
 bool write_scaled_neighbour(const std::string& from, const std::string& other, double scale, const std::string& path);
 
-/// One of the shapes below by its name, some 10 mm large. False: no such shape, or not written.
+/// One of the shapes below by its name, some 10 mm large, as IGES with loose faces where the path
+/// ends in .igs, else as BREP. False: no such shape, or not written.
 ///   "box", "rounded box" (all edges), "cylinder", "cone", "sphere"
 ///   "tube"            a cylinder's side alone
 ///   "creased tube"    the side of a drop-shaped cylinder, whose surface closes at the drop's tip
