@@ -131,8 +131,10 @@ TRIMRAY_CONST uint kEdgeClassCount = 4u;
 TRIMRAY_CONST float kUvBelowOne = 0.99999994f;
 
 // A hit belongs to the face as far as this outside of its domain, in uv_face, and is answered as the border's nearest
-// point: by so much the rounding of an angle (2.5e-7 of 2 pi) and of uv_scale may move it. Borders that need to reach
-// farther, because the neighbour's may be farther away, lie farther out in the pack.
+// point: along a seam nothing else makes both ends meet. A native surface needs 1.5e-7: an angle's error and that of pi
+// (4e-7) over 2 pi, and the roundings of uv_scale, product and sum. A spline that closes needs patch_overlap times
+// uv_scale (shaders/shared/patch_newton.h): of two bicubic patches with |S_u| = 1 this much where the ray meets them at
+// 11 degrees, 8e-7 at a right angle. Borders that need to reach farther lie farther out in the pack.
 TRIMRAY_CONST float kDomainSlack = 4e-6f;
 
 // CellEntry: a piece that passes through a mixed cell. Query q = (u, v) in a cell of grid index floor(uv * grid):

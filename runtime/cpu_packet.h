@@ -323,10 +323,11 @@ private:
         grazing = grazing || moving;
         settled = settled || (moving && within_pixel); // a tangent ray
         hit.doubt = select(moving && !within_pixel, min(newton.box_at, hit.doubt), hit.doubt);
-        const mask inside = settled && abs(uv.x - 0.5f) <= 0.5f + kUvOverlap && abs(uv.y - 0.5f) <= 0.5f + kUvOverlap;
-        if (!any_lane(inside))
+        if (!any_lane(settled))
             return grazing;
         SurfacePoint s = evaluate(newton, uv);
+        const real2 overlap = patch_overlap(s, planes, patch_rounding(newton.degree_u, newton.degree_v));
+        const mask inside = settled && abs(uv.x - 0.5f) <= 0.5f + overlap.x && abs(uv.y - 0.5f) <= 0.5f + overlap.y;
         const real r1 = dot(planes.n1, s.p) + planes.d1, r2 = dot(planes.n2, s.p) + planes.d2;
         const real residual = sqrt(r1 * r1 + r2 * r2);
         const real t = dot(s.p - origin, direction) / dot(direction, direction);

@@ -305,7 +305,10 @@ bool newton_from(PatchRay ray, PatchRecord patch, FaceRecord face, LeafBox box, 
         if (settled) {
             // not `precise`: glslc follows precise values around this loop for ever
             float t = dot(s.p - ray.origin, ray.direction) / dot(ray.direction, ray.direction);
-            if (next.residual <= max(newton.enough, kSmallResidual) && in_range(ray, t, hit)) {
+            vec2 overlap = patch_overlap(s, newton.planes, patch_rounding(int(newton.degree_u), int(newton.degree_v)));
+            vec2 off = abs(uv - 0.5f) - overlap;
+            if (max(off.x, off.y) <= 0.5f && next.residual <= max(newton.enough, kSmallResidual) &&
+                in_range(ray, t, hit)) {
                 bool back = newton.rims && dot(ray.direction, outward(patch, face, cross(s.du, s.dv))) > 0.0f;
                 offer(ray, patch.face, face, leaf, instance, t, uv, face_uv(patch, kKindBezier, uv), back, hit);
             }
@@ -326,8 +329,7 @@ bool newton_from(PatchRay ray, PatchRecord patch, FaceRecord face, LeafBox box, 
             if (!settled)
                 hit.doubt = min(hit.doubt, newton.box_past);
         }
-        vec2 off = abs(uv - 0.5f);
-        if (settled ? max(off.x, off.y) > 0.5f + kUvOverlap : step == kNewtonSteps - 1)
+        if (!settled && step == kNewtonSteps - 1)
             return grazing;
     }
     return grazing;

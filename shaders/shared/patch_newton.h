@@ -38,9 +38,6 @@ FN RayPlanes ray_planes(real3 origin, real3 direction)
 // two roots.
 const scalar kGrazing = 0.15f;
 
-// Newton may end outside of its patch by this much of uv_patch, so that neighbours overlap
-const scalar kUvOverlap = 1e-5f;
-
 const int kNewtonSteps = 12;
 // Rounding of a point with |q| about 1, patch units: a point so near its ray is on it. A step from a larger residual
 // ends within its square times the leaf's curvature: from kLargestLastResidual within 6e-8, below rounding.
@@ -101,6 +98,28 @@ FN real kept_near_leaf(real u, scalar leaf_lo, scalar leaf_hi)
     scalar middle = 0.5f * (leaf_lo + leaf_hi);
     scalar reach = kNewtonReach * (middle - leaf_lo);
     return clamp(u, real(max(middle - reach, -kNewtonOutside)), real(min(middle + reach, 1.0f + kNewtonOutside)));
+}
+
+// How far across the ray a point of a patch may lie from where it should, patch units, |q| <= 1: its control points are
+// rounded to 2^-22 (2^-23 off at most), each of the degree_u + degree_v levels of its evaluation rounds twice, and a
+// ray's plane four times; in two directions across.
+FN scalar patch_rounding(int degree_u, int degree_v)
+{
+    return 1.4142136f * (2.0f + 2.0f * scalar(degree_u + degree_v) + 4.0f) * kRounding;
+}
+
+// How far outside of its patch a root may be and belong to it, in uv_patch: as far as `rounding` may have moved it, so
+// that both neighbours reach their common side whatever the patch's shape and the ray's slant. With R_u, R_v the
+// Jacobian's columns, an error of length e moves the root by at most (e |R_v|, e |R_u|) / |det|.
+FN real2 patch_overlap(SurfacePoint s, RayPlanes ray, scalar rounding)
+{
+    real a1 = dot(ray.n1, s.du);
+    real a2 = dot(ray.n2, s.du);
+    real b1 = dot(ray.n1, s.dv);
+    real b2 = dot(ray.n2, s.dv);
+    real per_det = rounding / max(abs(a1 * b2 - b1 * a2), real(1e-20f));
+    return real2(min(per_det * sqrt(b1 * b1 + b2 * b2), real(kNewtonOutside)),
+                 min(per_det * sqrt(a1 * a1 + a2 * a2), real(kNewtonOutside)));
 }
 
 // A step from uv to `to`, shorter than this (uv_patch) because it was cut: the patch's rounding, |S_u| and |S_v| about
