@@ -1,7 +1,9 @@
 #include "preprocess/trim_chain.h"
 
+#include "preprocess/bezier_patch.h"
 #include "preprocess/trim_corner.h"
 #include "preprocess/vec2d.h"
+#include "preprocess/vec3d.h"
 
 #include <algorithm>
 #include <cmath>
@@ -81,6 +83,20 @@ public:
         if (surface_.kind != kKindBezier)
             mm = speed_at(surface_, 0.5 * (a.y + b.y));
         return std::hypot((a.x - b.x) * mm.x, (a.y - b.y) * mm.y);
+    }
+
+    /// Length in mm on the surface of a short line between two parameters, by its derivatives there.
+    double length_on_surface(Vec2d a, Vec2d b) const
+    {
+        if (surface_.kind != kKindBezier)
+            return distance(a, b);
+        const Vec2d way = b - a;
+        double longest = 0;
+        for (const Vec2d at : {a, b}) {
+            const SurfaceDerivatives s = evaluate(surface_, at.x, at.y);
+            longest = std::max(longest, norm(way.x * s.du + way.y * s.dv));
+        }
+        return longest;
     }
 
     /// Whole periods that bring `b` nearest to `a`.
@@ -193,6 +209,8 @@ std::vector<Walk> walk_loop(std::vector<Use> uses, const Joints& joints, double 
 // Neighbouring pcurves that miss each other by up to this many tolerances are moved together by half the gap each: as
 // far as the file contradicts itself, and no farther. What they move counts as deviation.
 constexpr double kJoinTolerances = 10;
+// The constant metric's lengths may be this many times those on the surface where ends are near each other.
+constexpr double kLargestStretch = 8;
 
 /// Joins the end of `before` with the start of `after`, which is `offset` (whole periods) away in uv. What the gap
 /// needs between them is put into `between`.
@@ -203,7 +221,7 @@ void join(CurvePiece& before, CurvePiece& after, Vec2d offset, const CadFace& fa
     if (a.x == b.x && a.y == b.y)
         return;
     const double flat_mm = length({gap.x * metric.mm_per_uv.x, gap.y * metric.mm_per_uv.y});
-    const double gap_mm = joints.distance(a, b);
+    const double gap_mm = joints.length_on_surface(a, b);
     report.largest_gap_mm = std::max(report.largest_gap_mm, gap_mm);
     if (flat_mm <= kJoinTolerances * metric.tolerance_mm) {
         report.largest_move_mm = std::max(report.largest_move_mm, 0.5 * flat_mm);
@@ -212,12 +230,15 @@ void join(CurvePiece& before, CurvePiece& after, Vec2d offset, const CadFace& fa
         return;
     }
     // either end may be off by the tolerance from where they should meet
-    const bool open = gap_mm > std::max(2 * face.tolerance_mm, kJoinTolerances * metric.tolerance_mm);
+    const double tolerated_mm = 2 * face.tolerance_mm;
+    const bool open = gap_mm > std::max(tolerated_mm, kJoinTolerances * metric.tolerance_mm);
     if (open) {
         report.had_open_loop = true;
         report.findings.push_back({TrimFindingKind::OpenLoop, a, gap_mm, report.loop, report.loop});
     }
-    if (!open && meet_at_corner(before, after, offset, metric.mm_per_uv, between))
+    // a pole's side is short on the surface, but no corner
+    const bool corner = !open && flat_mm <= kLargestStretch * tolerated_mm;
+    if (corner && meet_at_corner(before, after, offset, metric.mm_per_uv, between))
         return;
     CurvePiece line = line_piece(a, b);
     line.grow_mm = std::max({before.grow_mm, after.grow_mm, 0.0}); // the corner is its neighbours'
