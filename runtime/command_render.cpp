@@ -16,6 +16,7 @@
 #include <cmath>
 #include <memory>
 #include <optional>
+#include <unistd.h>
 
 namespace trimray {
 namespace {
@@ -130,8 +131,13 @@ int run_render(const RenderArguments& arguments)
     options.threads = arguments.threads;
     options.frames = arguments.frames;
     options.error_px = static_cast<float>(arguments.error_px);
+    const bool tells_progress = arguments.device == "reference" && isatty(STDERR_FILENO) != 0;
+    if (tells_progress)
+        options.progress = [](double share) { fmt::print(stderr, "\r\033[K{:.0f} %", 100 * share); };
     RenderStats stats;
     Result<Frame> frame = trace_picture(**tracer, options, arguments.samples, stats);
+    if (tells_progress)
+        fmt::print(stderr, "\r\033[K");
     if (!frame.ok())
         return report_error(frame.error());
     if (background->has_value())
@@ -159,7 +165,10 @@ void register_render(CLI::App& app, int& exit_code)
     command->add_option("--target", a->view.target, "x,y,z in mm; default: the middle of the model")->excludes(view);
     command->add_option("--up", a->view.up, "x,y,z; default: 0,0,1")->excludes(view);
     command->add_option("--fov", a->view.fov_deg, "Vertical field of view in degrees")->capture_default_str();
-    command->add_option("--device", a->device, "auto (a hardware GPU, else the CPU), cpu or vulkan")
+    command
+        ->add_option("--device", a->device,
+                     "auto (a hardware GPU, else the CPU), cpu, vulkan, or reference (in double: "
+                     "slow, to compare the others with)")
         ->capture_default_str();
     command->add_option("--trim", a->trim, "auto (exact), exact, hybrid, sdf or kd")->capture_default_str();
     command->add_option("--closest", a->closest, "stochastic or certified")->capture_default_str();

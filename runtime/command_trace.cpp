@@ -46,7 +46,8 @@ const Choice& closest_choice()
 
 const Choice& device_choice()
 {
-    static const Choice choice{"--device", {"auto", "cpu", "vulkan"}, {"auto", "cpu", "vulkan"}};
+    static const Choice choice{
+        "--device", {"auto", "cpu", "vulkan", "reference"}, {"auto", "cpu", "vulkan", "reference"}};
     return choice;
 }
 
@@ -88,6 +89,8 @@ Result<std::unique_ptr<Tracer>> make_tracer(const std::shared_ptr<const Scene>& 
         return make_vulkan_tracer(scene, true, false);
     if (device == "cpu")
         return make_cpu_tracer(scene);
+    if (device == "reference")
+        return make_reference_tracer(scene);
     Result<std::unique_ptr<Tracer>> gpu = make_vulkan_tracer(scene, false, false);
     if (gpu.ok()) {
         note = fmt::format("tracing on {}, a hardware GPU", (*gpu)->device_name());

@@ -7,6 +7,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -56,6 +57,9 @@ struct RenderOptions {
     float error_px = 0.02f;           // stop of Newton's iteration, in pixels
     bool shade = true;                // fill rgba
     bool record_trim_queries = false; // with TrimMode::Reference: fill RenderStats::trim_queries
+    // Told the share of a frame that is done, by one thread at a time. By the reference alone: the others are done at
+    // once
+    std::function<void(double share)> progress;
 
     // What is drawn over the surfaces: rgba alone changes, and only where it is asked for. Needs shade.
     EdgeLines edges = EdgeLines::None;
@@ -113,6 +117,11 @@ Result<std::unique_ptr<Tracer>> make_cpu_tracer(std::shared_ptr<const Scene> sce
 /// Fails: NoDevice, DeviceFailed. `allow_software`: accept a software driver (`--device vulkan`; never for auto).
 Result<std::unique_ptr<Tracer>> make_vulkan_tracer(std::shared_ptr<const Scene> scene, bool allow_software,
                                                    bool validation);
+
+/// The reference for closest hits (format/closest_reference.h): in double, with trims counted likewise, some thousand
+/// rays a second a thread. Its `certified` says that the ray touches nothing and no search was given up. Its render
+/// fails for effects and for trim modes other than auto, exact and reference: Usage.
+std::unique_ptr<Tracer> make_reference_tracer(std::shared_ptr<const Scene> scene);
 
 /// One ray, in world mm; `direction` need not be unit, distance_mm is along the unit direction. It meets backs wherever
 /// a face lies, in the rims of closed shells too, which a picture from outside does not show.

@@ -1,0 +1,311 @@
+#include "format/closest_reference.h"
+
+#include "format/native_reference.h"
+
+#include <cassert>
+#include <numbers>
+
+namespace trimray {
+namespace {
+
+using reference::Bounds;
+using reference::Ray;
+using reference::Root;
+using reference::Vec3;
+using Real = long double;
+using Real3 = std::array<Real, 3>;
+using Matrix = std::array<Real, 9>; // row-major
+
+constexpr double kTie = 1e-12; // of the distance
+
+Real3 times(const Matrix& m, const Real3& a)
+{
+    Real3 out;
+    for (size_t row = 0; row < 3; ++row)
+        out[row] = m[3 * row] * a[0] + m[3 * row + 1] * a[1] + m[3 * row + 2] * a[2];
+    return out;
+}
+
+Matrix inverse(const Matrix& m)
+{
+    Matrix out;
+    for (size_t i = 0; i < 3; ++i)
+        for (size_t j = 0; j < 3; ++j) {
+            const size_t i1 = (i + 1) % 3, i2 = (i + 2) % 3, j1 = (j + 1) % 3, j2 = (j + 2) % 3;
+            out[3 * j + i] = m[3 * i1 + j1] * m[3 * i2 + j2] - m[3 * i1 + j2] * m[3 * i2 + j1]; // of the transposed
+        }
+    const Real det = m[0] * out[0] + m[1] * out[3] + m[2] * out[6];
+    for (Real& x : out)
+        x /= det;
+    return out;
+}
+
+Real3 widen(const Vec3& a)
+{
+    return {a[0], a[1], a[2]};
+}
+
+uint kind_of(const PatchRecord& patch)
+{
+    return patch.shape & 0xffu;
+}
+
+double patch_origin(const PatchRecord& patch, size_t axis)
+{
+    return double(patch.origin_hi[axis]) + double(patch.origin_lo[axis]);
+}
+
+/// Columns are the patch's axes in part space.
+Matrix axes_of(const PatchRecord& patch)
+{
+    return {patch.axis_x[0], patch.axis_y[0], patch.axis_z[0], patch.axis_x[1], patch.axis_y[1],
+            patch.axis_z[1], patch.axis_x[2], patch.axis_y[2], patch.axis_z[2]};
+}
+
+/// In part units.
+Bounds part_bounds(const PatchRecord& patch, const Bounds& own)
+{
+    const Matrix axes = axes_of(patch);
+    Bounds box;
+    for (int corner = 0; corner < 8; ++corner) {
+        const Real3 p = times(axes, widen(own.corner(corner)));
+        Vec3 in_part;
+        for (size_t i = 0; i < 3; ++i)
+            in_part[i] = patch_origin(patch, i) + patch.scale * double(p[i]);
+        box.add(in_part);
+    }
+    return box;
+}
+
+} // namespace
+
+/// One ray on its way through the scene.
+struct ClosestReference::Walk {
+    Ray world;
+    double speed; // |direction|: mm a unit of t
+    uint instance = 0;
+    Real3 origin_part{}, direction_part{};
+    ReferenceHit best;
+    double best_t = std::numeric_limits<double>::infinity();
+    double open_from = std::numeric_limits<double>::infinity();
+
+    /// Beyond it nothing can be the closest any more.
+    double t_hi() const { return best_t * (1 + kTie); }
+};
+
+ClosestReference::ClosestReference(const PackImage& image)
+    : image_(image), trims_(image), beziers_(image.patches.size()), parts_(image.parts.size())
+{
+    for (size_t p = 0; p < image.parts.size(); ++p) {
+        const PartRecord& part = image.parts[p];
+        std::vector<Bounds> boxes;
+        for (uint i = part.first_patch; i < part.first_patch + part.patch_count; ++i) {
+            const PatchRecord& patch = image.patches[i];
+            if (kind_of(patch) == kKindBezier) {
+                double overlap[2];
+                for (size_t k = 0; k < 2; ++k)
+                    overlap[k] = std::min(double(kDomainSlack) / std::abs(double(patch.uv_scale[k])),
+                                          reference::BezierReference::kMostOverlap);
+                beziers_[i].emplace(patch, image.control_points.data(), overlap[0], overlap[1]);
+                boxes.push_back(part_bounds(patch, beziers_[i]->bounds()));
+                continue;
+            }
+            double lo[2], hi[2]; // uv_patch of the face's domain
+            for (size_t k = 0; k < 2; ++k) {
+                const double a = (-double(kDomainSlack) - patch.uv_offset[k]) / patch.uv_scale[k];
+                const double b = (1 + double(kDomainSlack) - patch.uv_offset[k]) / patch.uv_scale[k];
+                lo[k] = std::min(a, b);
+                hi[k] = std::max(a, b);
+            }
+            boxes.push_back(part_bounds(patch, reference::native_bounds(patch, lo, hi)));
+        }
+        parts_[p].tree = reference::BoxTree(std::move(boxes));
+    }
+    std::vector<Bounds> placed;
+    for (const InstanceRecord& instance : image.instances) {
+        const PartRecord& part = image.parts[instance.part];
+        // p_world = M (origin + scale p) + m
+        Placement placement;
+        Matrix scaled, plain;
+        for (size_t row = 0; row < 3; ++row) {
+            const double* m = instance.transform + 4 * row;
+            placement.moved_mm[row] = m[3];
+            for (size_t c = 0; c < 3; ++c) {
+                placement.moved_mm[row] += Real(m[c]) * part.origin_mm[c];
+                plain[3 * row + c] = m[c];
+                scaled[3 * row + c] = Real(m[c]) * part.scale_mm;
+            }
+        }
+        placement.to_part = inverse(scaled);
+        const Matrix back = inverse(plain);
+        for (size_t row = 0; row < 3; ++row)
+            for (size_t c = 0; c < 3; ++c)
+                placement.normal[row][c] = double(back[3 * c + row]);
+        placements_.push_back(placement);
+        const Bounds own = parts_[instance.part].tree.bounds();
+        Bounds box;
+        for (int corner = 0; corner < 8 && !own.empty(); ++corner) {
+            const Real3 p = times(scaled, widen(own.corner(corner)));
+            box.add({double(placement.moved_mm[0] + p[0]), double(placement.moved_mm[1] + p[1]),
+                     double(placement.moved_mm[2] + p[2])});
+        }
+        placed.push_back(box);
+    }
+    placed_ = reference::BoxTree(std::move(placed));
+}
+
+void ClosestReference::accept(uint patch_id, const Root& root, double t, Walk& walk) const
+{
+    const PatchRecord& patch = image_.patches[patch_id];
+    const double at[2] = {root.u, root.v};
+    std::array<double, 2> uv;
+    for (size_t k = 0; k < 2; ++k)
+        uv[k] = double(patch.uv_offset[k]) + double(patch.uv_scale[k]) * at[k];
+    const double half_turn = std::numbers::pi * double(patch.uv_scale[1]);
+    if (kind_of(patch) == kKindTorus && uv[1] < 0.5 - half_turn) // pack_layout.h, surface kinds
+        uv[1] += 2 * half_turn;
+    for (const double x : uv)
+        if (!(x >= -double(kDomainSlack) && x <= 1 + double(kDomainSlack)))
+            return;
+    const bool nearer = t < walk.best_t * (1 - kTie);
+    const bool first =
+        walk.instance < walk.best.instance || (walk.instance == walk.best.instance && patch.face < walk.best.face);
+    if (walk.best.hit && !nearer && !first)
+        return;
+    for (double& x : uv)
+        x = std::clamp(x, 0.0, double(kUvBelowOne));
+    if (!trims_.inside(patch.face, uv[0], uv[1]))
+        return;
+    walk.best_t = t;
+    walk.best.hit = true;
+    walk.best.distance_mm = t * walk.speed;
+    walk.best.face = patch.face;
+    walk.best.instance = walk.instance;
+    walk.best.patch = patch_id;
+    walk.best.uv_patch = {root.u, root.v};
+    walk.best.uv_face = uv;
+    walk.best.contact = root.contact;
+}
+
+void ClosestReference::intersect_patch(uint patch_id, Walk& walk) const
+{
+    const PatchRecord& patch = image_.patches[patch_id];
+    ++walk.best.patches;
+    // to patch space, from the line's point nearest to the patch's origin: there the rest of the way loses nothing
+    Real3 offset;
+    Real along = 0, length2 = 0;
+    for (size_t i = 0; i < 3; ++i) {
+        offset[i] = walk.origin_part[i] - (Real(patch.origin_hi[i]) + Real(patch.origin_lo[i]));
+        along -= offset[i] * walk.direction_part[i];
+        length2 += walk.direction_part[i] * walk.direction_part[i];
+    }
+    const Real base = along / length2;
+    for (size_t i = 0; i < 3; ++i)
+        offset[i] += base * walk.direction_part[i];
+    const Matrix back = inverse(axes_of(patch));
+    const Real3 o = times(back, offset), d = times(back, walk.direction_part);
+    Ray ray;
+    for (size_t i = 0; i < 3; ++i) {
+        ray.origin[i] = double(o[i] / patch.scale);
+        ray.direction[i] = double(d[i] / patch.scale);
+    }
+    const auto t_base = double(base);
+    const auto take = [&](const Root& root) {
+        const double t = t_base + root.t;
+        if (t > 0 && t <= walk.t_hi())
+            accept(patch_id, root, t, walk);
+        return walk.t_hi() - t_base;
+    };
+    if (kind_of(patch) != kKindBezier) {
+        for (const Root& root : reference::native_roots(patch, ray))
+            take(root);
+        return;
+    }
+    const reference::SearchEnd end = beziers_[patch_id]->intersect(ray, -t_base, walk.t_hi() - t_base, take);
+    walk.best.boxes += end.boxes;
+    walk.open_from = std::min(walk.open_from, t_base + end.open_from);
+}
+
+ReferenceHit ClosestReference::closest(const Ray& ray) const
+{
+    Walk walk;
+    walk.world = ray;
+    walk.speed = reference::length(ray.direction);
+    assert(walk.speed > 0);
+    placed_.walk(ray, walk.t_hi(), [&](uint instance) {
+        const Placement& placement = placements_[instance];
+        const PartRecord& part = image_.parts[image_.instances[instance].part];
+        walk.instance = instance;
+        Real3 offset;
+        for (size_t i = 0; i < 3; ++i)
+            offset[i] = ray.origin[i] - placement.moved_mm[i];
+        walk.origin_part = times(placement.to_part, offset);
+        walk.direction_part = times(placement.to_part, widen(ray.direction));
+        Ray in_part;
+        for (size_t i = 0; i < 3; ++i) {
+            in_part.origin[i] = double(walk.origin_part[i]);
+            in_part.direction[i] = double(walk.direction_part[i]);
+        }
+        parts_[image_.instances[instance].part].tree.walk(in_part, walk.t_hi(), [&](uint patch) {
+            intersect_patch(part.first_patch + patch, walk);
+            return walk.t_hi();
+        });
+        return walk.t_hi();
+    });
+    walk.best.open = walk.open_from < walk.best_t;
+    if (walk.best.hit)
+        finish(walk.best);
+    return walk.best;
+}
+
+void ClosestReference::finish(ReferenceHit& hit) const
+{
+    const PatchRecord& patch = image_.patches[hit.patch];
+    const FaceRecord& face = image_.faces[hit.face];
+    for (size_t k = 0; k < 2; ++k)
+        hit.uv_file[k] = face.domain_lo[k] + (face.domain_hi[k] - face.domain_lo[k]) * hit.uv_face[k];
+    const Vec3 own = kind_of(patch) == kKindBezier ? beziers_[hit.patch]->normal(hit.uv_patch[0], hit.uv_patch[1])
+                                                   : reference::native_normal(patch, hit.uv_patch[0], hit.uv_patch[1]);
+    const Real3 in_part = times(axes_of(patch), widen(own));
+    const Matrix a = axes_of(patch);
+    const Real handed =
+        a[0] * (a[4] * a[8] - a[5] * a[7]) - a[1] * (a[3] * a[8] - a[5] * a[6]) + a[2] * (a[3] * a[7] - a[4] * a[6]);
+    const double turn = (handed < 0) != ((face.flags & kFaceReversed) != 0) ? -1 : 1;
+    // n_world = M^-T n: outward stays outward in a mirror image
+    const Placement& placement = placements_[hit.instance];
+    Vec3 normal{};
+    for (size_t row = 0; row < 3; ++row)
+        for (size_t c = 0; c < 3; ++c)
+            normal[row] += turn * placement.normal[row][c] * double(in_part[c]);
+    const double size = reference::length(normal);
+    if (size > 0)
+        hit.normal = reference::operator*(normal, 1 / size);
+}
+
+Doubt ClosestReference::doubt(const Ray& ray, const ReferenceHit& answer, const Vec3& step_x, const Vec3& step_y,
+                              double reach_px) const
+{
+    constexpr int kDirections = 8;
+    using reference::operator+;
+    using reference::operator*;
+    const double pixel =
+        std::max(reference::length(step_x), reference::length(step_y)) / reference::length(ray.direction);
+    Doubt doubt = Doubt::None;
+    for (int i = 0; i < kDirections; ++i) {
+        const double angle = 2 * std::numbers::pi * i / kDirections;
+        Ray moved = ray;
+        moved.direction = ray.direction + step_x * (reach_px * std::cos(angle)) + step_y * (reach_px * std::sin(angle));
+        const ReferenceHit other = closest(moved);
+        if (other.hit != answer.hit)
+            return Doubt::Tangent;
+        if (!answer.hit)
+            continue;
+        if (std::abs(other.distance_mm - answer.distance_mm) > pixel * std::min(other.distance_mm, answer.distance_mm))
+            return Doubt::Tangent;
+        if (other.face != answer.face || other.instance != answer.instance)
+            doubt = Doubt::Face;
+    }
+    return doubt;
+}
+
+} // namespace trimray

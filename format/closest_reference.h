@@ -1,0 +1,80 @@
+// The reference for closest hits: every ray against every surface that its boxes let through, in double, with trims by
+// TrimReference. What the tracers are measured against; slow, and shares no code with them or with what they read
+// beyond the surfaces, trims and placements themselves (no leaves, trees, cells or textures).
+//
+// What counts as a hit: a point of a face's surface at t > 0 whose uv_face lies in [-kDomainSlack, 1 + kDomainSlack]^2,
+// as SPEC.md states, and inside the face's loops once it is moved to the nearest point of [0, kUvBelowOne]^2. A Bezier
+// patch goes on as its polynomials do beyond each of its sides by kDomainSlack in uv_face (at most 0.01 of the patch),
+// so that neighbouring patches, whose control points are rounded each in its own frame, leave no crack.
+// Of two hits whose distances differ by at most 1e-12 of themselves, that of the lower instance and then of the lower
+// face is the closest.
+#pragma once
+
+#include "format/bezier_reference.h"
+#include "format/box_tree.h"
+#include "format/pack_image.h"
+#include "format/trim_reference.h"
+
+#include <optional>
+#include <vector>
+
+namespace trimray {
+
+struct ReferenceHit {
+    bool hit = false;
+    double distance_mm = std::numeric_limits<double>::infinity();
+    uint face = 0, instance = 0, patch = 0;
+    std::array<double, 2> uv_patch{}, uv_face{}, uv_file{};
+    std::array<double, 3> normal{};  // unit, world, outward as the face's orientation says; 0 where there is none
+    bool contact = false;            // the ray touches the surface there within rounding
+    bool open = false;               // a search was given up: a nearer hit may exist
+    uint64_t patches = 0, boxes = 0; // work: patches met by their boxes, parts of Bezier patches looked at
+};
+
+/// How an answer changes when its ray moves by a hair.
+enum class Doubt {
+    None,
+    Face,    // another face or instance, at a depth that goes on
+    Tangent, // a hit where there was none or none where there was one, or a jump in depth
+};
+
+class ClosestReference {
+public:
+    using Vec3 = reference::Vec3;
+
+    /// Domain: a validated image, which must outlive it.
+    explicit ClosestReference(const PackImage& image);
+
+    /// The closest hit of a ray in world mm. Domain: finite, direction not 0 (it need not be unit).
+    ReferenceHit closest(const reference::Ray& ray) const;
+
+    /// Whether `answer`, which is closest(ray)'s, is one that a hair decides: the ray's direction is moved by
+    /// `reach_px` in eight directions of the picture, given the changes of direction from pixel to pixel. A jump in
+    /// depth is one of more than a pixel's size at that distance. Costs eight rays.
+    Doubt doubt(const reference::Ray& ray, const ReferenceHit& answer, const Vec3& step_x, const Vec3& step_y,
+                double reach_px = 1e-3) const;
+
+private:
+    struct PartTree {
+        reference::BoxTree tree; // part units
+    };
+    struct Placement {
+        std::array<long double, 9> to_part{};  // part units a mm
+        std::array<long double, 3> moved_mm{}; // where part units' origin lies
+        double normal[3][3];                   // M^-T, any scale
+    };
+    struct Walk;
+
+    void intersect_patch(uint patch, Walk& walk) const;
+    void accept(uint patch, const reference::Root& root, double t, Walk& walk) const;
+    void finish(ReferenceHit& hit) const;
+
+    const PackImage& image_;
+    TrimReference trims_;
+    std::vector<std::optional<reference::BezierReference>> beziers_; // of each patch that is one
+    std::vector<PartTree> parts_;
+    std::vector<Placement> placements_;
+    reference::BoxTree placed_; // instances, world mm
+};
+
+} // namespace trimray

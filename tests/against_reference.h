@@ -1,0 +1,157 @@
+// A tracer's frame against the reference for closest hits, pixel by pixel: where they disagree, by how much, and what
+// of it a hair decides.
+#pragma once
+
+#include "format/closest_reference.h"
+#include "runtime/tracer.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <mutex>
+#include <string>
+#include <vector>
+
+namespace trimray {
+
+enum class Fault {
+    FalseMiss,  // the reference has a hit, the tracer none
+    FalseHit,   // the other way round
+    WrongDepth, // both hit, farther apart than kWrongDepthPx
+    WrongFace,  // the same depth, another face or instance
+};
+inline constexpr const char* kFaultNames[] = {"false miss", "false hit", "wrong depth", "wrong face"};
+inline constexpr size_t kFaultCount = 4;
+inline constexpr double kWrongDepthPx = 1; // footprints: distance times the angle of a pixel
+
+struct FaultyPixel {
+    uint32_t x = 0, y = 0;
+    Fault fault = Fault::FalseMiss;
+    Doubt doubt = Doubt::None; // what the reference says of it within 1e-3 pixels
+    bool certified = false;    // by the tracer
+    double tracer_mm = 0, reference_mm = 0, footprint_mm = 0;
+    int32_t tracer_face = -1, reference_face = -1;
+    std::array<double, 2> reference_uv_face{};
+    double cosine = 0; // of the angle between the ray and the reference's normal
+};
+
+struct AgainstReference {
+    uint64_t rays = 0, both_hit = 0;
+    std::array<uint64_t, kFaultCount> faults{};         // of rays that the reference is sure of
+    std::array<uint64_t, kFaultCount> doubtful{};       // of rays that a hair decides (of wrong faces: a border)
+    uint64_t certified_wrong = 0;                       // of `faults` but for wrong faces: claimed to be right
+    uint64_t uncertified = 0, uncertified_right = 0;    // pixels; and those of them that agree
+    uint64_t not_finite = 0;                            // NaN, or an infinity other than a miss's depth
+    uint64_t open = 0;                                  // pixels at which the reference gave a search up
+    double largest_depth_px = 0, mean_depth_px = 0;     // |dt| in footprints where hit and face agree
+    double largest_normal_deg = 0, mean_normal_deg = 0; // likewise
+    std::vector<FaultyPixel> pixels;                    // every fault and doubtful one, row by row
+};
+
+inline AgainstReference compare_with_reference(const Frame& frame, const Camera& camera,
+                                               const ClosestReference& closest)
+{
+    using reference::Vec3;
+    using reference::operator+;
+    using reference::operator*;
+    constexpr double kDegrees = 57.29577951308232;
+    const CameraRays rays = camera_rays(camera, frame.width, frame.height);
+    std::vector<AgainstReference> rows(frame.height);
+    tbb::parallel_for(0u, frame.height, [&](uint32_t y) {
+        AgainstReference& row = rows[y];
+        for (uint32_t x = 0; x < frame.width; ++x) {
+            const size_t i = size_t(y) * frame.width + x;
+            const reference::Ray ray{rays.eye, rays.corner + rays.step_x * (x + 0.5) + rays.step_y * (y + 0.5)};
+            const ReferenceHit hit = closest.closest(ray);
+            const double speed = reference::length(ray.direction);
+            const double pixel = std::max(reference::length(rays.step_x), reference::length(rays.step_y)) / speed;
+            ++row.rays;
+            row.open += hit.open;
+            row.uncertified += !frame.certified[i];
+            const bool traced = frame.face[i] >= 0;
+            bool finite = !std::isnan(frame.depth_mm[i]) && std::isfinite(frame.depth_mm[i]) == traced;
+            for (size_t k = 0; k < 4; ++k)
+                finite &= std::isfinite(frame.rgba[4 * i + k]);
+            for (size_t k = 0; k < 3; ++k)
+                finite &= std::isfinite(frame.normal[3 * i + k]);
+            for (size_t k = 0; k < 2; ++k)
+                finite &= std::isfinite(frame.uv[2 * i + k]);
+            row.not_finite += !finite;
+
+            FaultyPixel fault;
+            bool wrong = true;
+            const double footprint = pixel * hit.distance_mm;
+            const double depth_px = std::abs(double(frame.depth_mm[i]) - hit.distance_mm) / footprint;
+            if (hit.hit != traced) {
+                fault.fault = hit.hit ? Fault::FalseMiss : Fault::FalseHit;
+            } else if (!hit.hit) {
+                wrong = false;
+            } else if (!(depth_px <= kWrongDepthPx)) {
+                fault.fault = Fault::WrongDepth;
+            } else if (frame.face[i] != int32_t(hit.face) || frame.instance[i] != int32_t(hit.instance)) {
+                fault.fault = Fault::WrongFace;
+            } else {
+                wrong = false;
+            }
+            row.both_hit += hit.hit && traced;
+            if (!wrong) {
+                row.uncertified_right += !frame.certified[i];
+                if (!hit.hit)
+                    continue;
+                row.mean_depth_px += depth_px;
+                row.largest_depth_px = std::max(row.largest_depth_px, depth_px);
+                const Vec3 n{frame.normal[3 * i], frame.normal[3 * i + 1], frame.normal[3 * i + 2]};
+                const double deg = kDegrees * std::atan2(reference::length(reference::cross(n, hit.normal)),
+                                                         reference::dot(n, hit.normal));
+                row.mean_normal_deg += deg;
+                row.largest_normal_deg = std::max(row.largest_normal_deg, deg);
+                continue;
+            }
+            fault.x = x;
+            fault.y = y;
+            fault.doubt = closest.doubt(ray, hit, rays.step_x, rays.step_y);
+            fault.certified = frame.certified[i] != 0;
+            fault.tracer_mm = frame.depth_mm[i];
+            fault.reference_mm = hit.distance_mm;
+            fault.footprint_mm = footprint;
+            fault.tracer_face = frame.face[i];
+            fault.reference_face = hit.hit ? int32_t(hit.face) : -1;
+            fault.reference_uv_face = hit.uv_face;
+            fault.cosine = std::abs(reference::dot(hit.normal, ray.direction)) / speed;
+            const bool of_face = fault.fault == Fault::WrongFace;
+            const bool sure = fault.doubt == Doubt::None || (!of_face && fault.doubt == Doubt::Face);
+            ++(sure ? row.faults : row.doubtful)[size_t(fault.fault)];
+            row.certified_wrong += sure && !of_face && fault.certified;
+            row.pixels.push_back(fault);
+        }
+    });
+    AgainstReference all;
+    uint64_t agree = 0;
+    for (const AgainstReference& row : rows) {
+        all.rays += row.rays;
+        all.both_hit += row.both_hit;
+        for (size_t k = 0; k < kFaultCount; ++k) {
+            all.faults[k] += row.faults[k];
+            all.doubtful[k] += row.doubtful[k];
+        }
+        all.certified_wrong += row.certified_wrong;
+        all.uncertified += row.uncertified;
+        all.uncertified_right += row.uncertified_right;
+        all.not_finite += row.not_finite;
+        all.open += row.open;
+        all.largest_depth_px = std::max(all.largest_depth_px, row.largest_depth_px);
+        all.largest_normal_deg = std::max(all.largest_normal_deg, row.largest_normal_deg);
+        all.mean_depth_px += row.mean_depth_px;
+        all.mean_normal_deg += row.mean_normal_deg;
+        agree += row.both_hit;
+        all.pixels.insert(all.pixels.end(), row.pixels.begin(), row.pixels.end());
+    }
+    for (const FaultyPixel& pixel : all.pixels)
+        agree -= pixel.fault == Fault::WrongDepth || pixel.fault == Fault::WrongFace;
+    all.mean_depth_px /= double(std::max<uint64_t>(agree, 1));
+    all.mean_normal_deg /= double(std::max<uint64_t>(agree, 1));
+    return all;
+}
+
+} // namespace trimray
