@@ -47,7 +47,7 @@ struct Ray {
 struct Root {
     double t = 0;         // of the ray
     double u = 0, v = 0;  // uv_patch
-    bool contact = false; // the line touches there, or meets the surface twice within what rounding can tell apart
+    bool contact = false; // the line touches, or may meet the surface more than once, within 1e-6 patch units of there
 };
 
 /// Called with roots as they are found. Returns the t from which on no more are asked for.

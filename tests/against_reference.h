@@ -29,6 +29,7 @@ struct FaultyPixel {
     uint32_t x = 0, y = 0;
     Fault fault = Fault::FalseMiss;
     Doubt doubt = Doubt::None; // what the reference says of it within 1e-3 pixels
+    double hair_px = 0;        // the least of 1e-3, 1e-2, 0.1 and 1 pixels by which moving the ray makes it doubtful
     bool certified = false;    // by the tracer
     double tracer_mm = 0, reference_mm = 0, footprint_mm = 0;
     int32_t tracer_face = -1, reference_face = -1;
@@ -110,7 +111,16 @@ inline AgainstReference compare_with_reference(const Frame& frame, const Camera&
             }
             fault.x = x;
             fault.y = y;
-            fault.doubt = closest.doubt(ray, hit, rays.step_x, rays.step_y);
+            fault.hair_px = std::numeric_limits<double>::infinity();
+            for (const double reach_px : {1e-3, 1e-2, 0.1, 1.0}) {
+                const Doubt doubt = closest.doubt(ray, hit, rays.step_x, rays.step_y, reach_px);
+                if (reach_px == 1e-3)
+                    fault.doubt = doubt;
+                if (doubt == Doubt::None || (doubt == Doubt::Face && fault.fault != Fault::WrongFace))
+                    continue;
+                fault.hair_px = reach_px;
+                break;
+            }
             fault.certified = frame.certified[i] != 0;
             fault.tracer_mm = frame.depth_mm[i];
             fault.reference_mm = hit.distance_mm;

@@ -30,6 +30,7 @@ Json to_json(const FaultyPixel& p)
             {"doubt", p.doubt == Doubt::Tangent ? "tangent"
                       : p.doubt == Doubt::Face  ? "face"
                                                 : "none"},
+            {"hair_px", p.hair_px},
             {"certified", p.certified},
             {"mm", {p.tracer_mm, p.reference_mm}},
             {"footprint_mm", p.footprint_mm},

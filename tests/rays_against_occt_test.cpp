@@ -1,4 +1,5 @@
-// Rays through the whole chain (file, model, pack bytes, CPU tracer) against the CAD kernel's own intersections.
+// Rays through the whole chain (file, model, pack bytes, tracer) against the CAD kernel's own intersections: the CPU
+// tracer's, and those of the reference that the tracers are measured with.
 #include "format/pack_reader.h"
 #include "format/pack_writer.h"
 #include "preprocess/build_pack.h"
@@ -10,6 +11,7 @@
 #include <fmt/core.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <unistd.h>
@@ -102,6 +104,13 @@ std::string describe(const oracle::Agreement& agreement)
     return text;
 }
 
+/// Counts of one tracer's rays over all views.
+struct Counted {
+    std::unique_ptr<Tracer> tracer;
+    size_t rays = 0, agree = 0;
+    std::string listed;
+};
+
 void expect_agreement(const std::string& path)
 {
     std::string error;
@@ -109,24 +118,31 @@ void expect_agreement(const std::string& path)
     ASSERT_TRUE(occt) << path << ": " << error;
     const auto scene = scene_through_bytes(path);
     ASSERT_TRUE(scene);
-    auto tracer = make_cpu_tracer(scene);
-    ASSERT_TRUE(tracer.ok()) << tracer.error().detail;
-    size_t rays = 0, agree = 0;
-    std::string listed;
+    auto cpu = make_cpu_tracer(scene);
+    ASSERT_TRUE(cpu.ok()) << cpu.error().detail;
+    std::array<Counted, 2> both;
+    both[0].tracer = std::move(*cpu);
+    both[1].tracer = make_reference_tracer(scene);
     for (const oracle::View& view : views(*occt)) {
-        const std::vector<float> ours = depths(**tracer, view);
-        ASSERT_EQ(ours.size(), size_t(kWidth) * kHeight);
         const std::vector<oracle::Ray> view_rays = oracle::view_rays(view, kWidth, kHeight);
-        const oracle::Agreement agreement = occt->compare(view_rays, ours, occt->cast(view_rays));
-        EXPECT_GT(agreement.both_hit, agreement.rays / 50) << path << ": the view shows nothing";
-        EXPECT_EQ(agreement.unexplained(), 0u) << path << "\n" << describe(agreement);
-        rays += agreement.rays;
-        agree += agreement.agree;
-        listed += describe(agreement);
+        const std::vector<oracle::OracleHit> hits = occt->cast(view_rays);
+        for (Counted& counted : both) {
+            const std::string where = path + ", " + counted.tracer->device_name();
+            const std::vector<float> ours = depths(*counted.tracer, view);
+            ASSERT_EQ(ours.size(), size_t(kWidth) * kHeight);
+            const oracle::Agreement agreement = occt->compare(view_rays, ours, hits);
+            EXPECT_GT(agreement.both_hit, agreement.rays / 50) << where << ": the view shows nothing";
+            EXPECT_EQ(agreement.unexplained(), 0u) << where << "\n" << describe(agreement);
+            counted.rays += agreement.rays;
+            counted.agree += agreement.agree;
+            counted.listed += describe(agreement);
+        }
     }
-    EXPECT_GE(double(agree), kRequiredShare * double(rays))
-        << path << ": " << rays - agree << " of " << rays << " rays disagree\n"
-        << listed;
+    for (const Counted& counted : both)
+        EXPECT_GE(double(counted.agree), kRequiredShare * double(counted.rays))
+            << path << ", " << counted.tracer->device_name() << ": " << counted.rays - counted.agree << " of "
+            << counted.rays << " rays disagree\n"
+            << counted.listed;
 }
 
 class RaysAgainstOcct : public testing::TestWithParam<const char*> {};
