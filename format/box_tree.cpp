@@ -30,9 +30,15 @@ double entry(const Bounds& box, const Ray& ray, double t_hi)
 BoxTree::BoxTree(std::vector<Bounds> boxes) : boxes_(std::move(boxes))
 {
     constexpr double kGrowth = 1e-9; // of the box and of its distance from the origin
+    constexpr double kFar = 1e100;   // a box that is not finite is everywhere
     for (Bounds& box : boxes_) {
         if (box.empty())
             continue;
+        for (size_t i = 0; i < 3; ++i) {
+            const bool finite = std::isfinite(box.lo[i]) && std::isfinite(box.hi[i]);
+            box.lo[i] = finite ? box.lo[i] : -kFar;
+            box.hi[i] = finite ? box.hi[i] : kFar;
+        }
         double reach = 0;
         for (size_t i = 0; i < 3; ++i)
             reach = std::max({reach, std::abs(box.lo[i]), std::abs(box.hi[i])});

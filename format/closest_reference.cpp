@@ -82,7 +82,8 @@ Bounds part_bounds(const PatchRecord& patch, const Bounds& own)
 /// One ray on its way through the scene.
 struct ClosestReference::Walk {
     Ray world;
-    double speed; // |direction|: mm a unit of t
+    double speed;              // |direction|: mm a unit of t
+    bool shells_alone = false; // meets faces with rims only, all of them
     uint instance = 0;
     Real3 origin_part{}, direction_part{};
     ReferenceHit best;
@@ -119,7 +120,7 @@ ClosestReference::ClosestReference(const PackImage& image)
             }
             boxes.push_back(part_bounds(patch, reference::native_bounds(patch, lo, hi)));
         }
-        parts_[p].tree = reference::BoxTree(std::move(boxes));
+        parts_[p] = reference::BoxTree(std::move(boxes));
     }
     std::vector<Bounds> placed;
     for (const InstanceRecord& instance : image.instances) {
@@ -142,7 +143,7 @@ ClosestReference::ClosestReference(const PackImage& image)
             for (size_t c = 0; c < 3; ++c)
                 placement.normal[row][c] = double(back[3 * c + row]);
         placements_.push_back(placement);
-        const Bounds own = parts_[instance.part].tree.bounds();
+        const Bounds own = parts_[instance.part].bounds();
         Bounds box;
         for (int corner = 0; corner < 8 && !own.empty(); ++corner) {
             const Real3 p = times(scaled, widen(own.corner(corner)));
@@ -174,7 +175,7 @@ void ClosestReference::accept(uint patch_id, const Root& root, double t, Walk& w
         return;
     for (double& x : uv)
         x = std::clamp(x, 0.0, double(kUvBelowOne));
-    if (!trims_.inside(patch.face, uv[0], uv[1]))
+    if (!trims_.inside(patch.face, uv[0], uv[1]) || is_cut_rim(patch_id, root, uv, walk))
         return;
     walk.best_t = t;
     walk.best.hit = true;
@@ -187,9 +188,62 @@ void ClosestReference::accept(uint patch_id, const Root& root, double t, Walk& w
     walk.best.contact = root.contact;
 }
 
+bool ClosestReference::is_cut_rim(uint patch_id, const Root& root, const std::array<double, 2>& uv,
+                                  const Walk& walk) const
+{
+    const uint face_id = image_.patches[patch_id].face, flags = image_.faces[face_id].flags;
+    if (walk.shells_alone || (flags & kFaceRims) == 0)
+        return false;
+    const Vec3 outward = outward_in_part(patch_id, {root.u, root.v});
+    Real along = 0;
+    for (size_t i = 0; i < 3; ++i)
+        along += walk.direction_part[i] * outward[i];
+    if (!(along > 0))
+        return false; // a front
+    const double width[2] = {std::ldexp(1.0, -int(flags >> kFaceRimBit & kFaceRimMask)),
+                             std::ldexp(1.0, -int(flags >> (kFaceRimBit + kFaceRimBits) & kFaceRimMask))};
+    for (int corner = 0; corner < 4; ++corner) {
+        const double q[2] = {uv[0] + (corner & 1 ? width[0] : -width[0]), uv[1] + (corner & 2 ? width[1] : -width[1])};
+        const bool in_domain = q[0] >= 0 && q[0] <= 1 && q[1] >= 0 && q[1] <= 1;
+        if (!in_domain ||
+            !trims_.inside(face_id, std::min(q[0], double(kUvBelowOne)), std::min(q[1], double(kUvBelowOne))))
+            return begins_outside(walk);
+    }
+    return false;
+}
+
+bool ClosestReference::begins_outside(const Walk& walk) const
+{
+    constexpr std::array<Vec3, 7> kDirections{{{0.83, 0.21, 0.52},
+                                               {-0.71, 0.57, -0.41},
+                                               {0.31, -0.78, 0.55},
+                                               {-0.36, -0.61, -0.7},
+                                               {0.17, 0.9, -0.39},
+                                               {-0.53, -0.12, 0.84},
+                                               {0.66, -0.44, -0.61}}};
+    size_t backs = 0;
+    for (const Vec3& direction : kDirections) {
+        Walk probe;
+        probe.world = {walk.world.origin, direction};
+        probe.speed = reference::length(direction);
+        probe.shells_alone = true;
+        intersect_instance(walk.instance, probe);
+        if (!probe.best.hit)
+            continue;
+        const Vec3 outward = outward_in_part(probe.best.patch, probe.best.uv_patch);
+        Real along = 0;
+        for (size_t i = 0; i < 3; ++i)
+            along += probe.direction_part[i] * outward[i];
+        backs += along > 0;
+    }
+    return 2 * backs < kDirections.size();
+}
+
 void ClosestReference::intersect_patch(uint patch_id, Walk& walk) const
 {
     const PatchRecord& patch = image_.patches[patch_id];
+    if (walk.shells_alone && (image_.faces[patch.face].flags & kFaceRims) == 0)
+        return;
     ++walk.best.patches;
     // to patch space, from the line's point nearest to the patch's origin: there the rest of the way loses nothing
     Real3 offset;
@@ -226,6 +280,28 @@ void ClosestReference::intersect_patch(uint patch_id, Walk& walk) const
     walk.open_from = std::min(walk.open_from, t_base + end.open_from);
 }
 
+void ClosestReference::intersect_instance(uint instance, Walk& walk) const
+{
+    const Placement& placement = placements_[instance];
+    const uint part_id = image_.instances[instance].part;
+    const PartRecord& part = image_.parts[part_id];
+    walk.instance = instance;
+    Real3 offset;
+    for (size_t i = 0; i < 3; ++i)
+        offset[i] = walk.world.origin[i] - placement.moved_mm[i];
+    walk.origin_part = times(placement.to_part, offset);
+    walk.direction_part = times(placement.to_part, widen(walk.world.direction));
+    Ray in_part;
+    for (size_t i = 0; i < 3; ++i) {
+        in_part.origin[i] = double(walk.origin_part[i]);
+        in_part.direction[i] = double(walk.direction_part[i]);
+    }
+    parts_[part_id].walk(in_part, walk.t_hi(), [&](uint patch) {
+        intersect_patch(part.first_patch + patch, walk);
+        return walk.t_hi();
+    });
+}
+
 ReferenceHit ClosestReference::closest(const Ray& ray) const
 {
     Walk walk;
@@ -233,23 +309,7 @@ ReferenceHit ClosestReference::closest(const Ray& ray) const
     walk.speed = reference::length(ray.direction);
     assert(walk.speed > 0);
     placed_.walk(ray, walk.t_hi(), [&](uint instance) {
-        const Placement& placement = placements_[instance];
-        const PartRecord& part = image_.parts[image_.instances[instance].part];
-        walk.instance = instance;
-        Real3 offset;
-        for (size_t i = 0; i < 3; ++i)
-            offset[i] = ray.origin[i] - placement.moved_mm[i];
-        walk.origin_part = times(placement.to_part, offset);
-        walk.direction_part = times(placement.to_part, widen(ray.direction));
-        Ray in_part;
-        for (size_t i = 0; i < 3; ++i) {
-            in_part.origin[i] = double(walk.origin_part[i]);
-            in_part.direction[i] = double(walk.direction_part[i]);
-        }
-        parts_[image_.instances[instance].part].tree.walk(in_part, walk.t_hi(), [&](uint patch) {
-            intersect_patch(part.first_patch + patch, walk);
-            return walk.t_hi();
-        });
+        intersect_instance(instance, walk);
         return walk.t_hi();
     });
     walk.best.open = walk.open_from < walk.best_t;
@@ -258,25 +318,32 @@ ReferenceHit ClosestReference::closest(const Ray& ray) const
     return walk.best;
 }
 
-void ClosestReference::finish(ReferenceHit& hit) const
+/// Unnormalised; axes of the part, a covector.
+Vec3 ClosestReference::outward_in_part(uint patch_id, const std::array<double, 2>& uv_patch) const
 {
-    const PatchRecord& patch = image_.patches[hit.patch];
-    const FaceRecord& face = image_.faces[hit.face];
-    for (size_t k = 0; k < 2; ++k)
-        hit.uv_file[k] = face.domain_lo[k] + (face.domain_hi[k] - face.domain_lo[k]) * hit.uv_face[k];
-    const Vec3 own = kind_of(patch) == kKindBezier ? beziers_[hit.patch]->normal(hit.uv_patch[0], hit.uv_patch[1])
-                                                   : reference::native_normal(patch, hit.uv_patch[0], hit.uv_patch[1]);
-    const Real3 in_part = times(axes_of(patch), widen(own));
+    const PatchRecord& patch = image_.patches[patch_id];
+    const Vec3 own = kind_of(patch) == kKindBezier ? beziers_[patch_id]->normal(uv_patch[0], uv_patch[1])
+                                                   : reference::native_normal(patch, uv_patch[0], uv_patch[1]);
     const Matrix a = axes_of(patch);
     const Real handed =
         a[0] * (a[4] * a[8] - a[5] * a[7]) - a[1] * (a[3] * a[8] - a[5] * a[6]) + a[2] * (a[3] * a[7] - a[4] * a[6]);
-    const double turn = (handed < 0) != ((face.flags & kFaceReversed) != 0) ? -1 : 1;
+    const double turn = (handed < 0) != ((image_.faces[patch.face].flags & kFaceReversed) != 0) ? -1 : 1;
+    const Real3 in_part = times(a, widen(own));
+    return {turn * double(in_part[0]), turn * double(in_part[1]), turn * double(in_part[2])};
+}
+
+void ClosestReference::finish(ReferenceHit& hit) const
+{
+    const FaceRecord& face = image_.faces[hit.face];
+    for (size_t k = 0; k < 2; ++k)
+        hit.uv_file[k] = face.domain_lo[k] + (face.domain_hi[k] - face.domain_lo[k]) * hit.uv_face[k];
     // n_world = M^-T n: outward stays outward in a mirror image
+    const Vec3 in_part = outward_in_part(hit.patch, hit.uv_patch);
     const Placement& placement = placements_[hit.instance];
     Vec3 normal{};
     for (size_t row = 0; row < 3; ++row)
         for (size_t c = 0; c < 3; ++c)
-            normal[row] += turn * placement.normal[row][c] * double(in_part[c]);
+            normal[row] += placement.normal[row][c] * in_part[c];
     const double size = reference::length(normal);
     if (size > 0)
         hit.normal = reference::operator*(normal, 1 / size);

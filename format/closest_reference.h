@@ -5,7 +5,9 @@
 // What counts as a hit: a point of a face's surface at t > 0 whose uv_face lies in [-kDomainSlack, 1 + kDomainSlack]^2,
 // as SPEC.md states, and inside the face's loops once it is moved to the nearest point of [0, kUvBelowOne]^2. A Bezier
 // patch goes on as its polynomials do beyond each of its sides by kDomainSlack in uv_face (at most 0.01 of the patch),
-// so that neighbouring patches, whose control points are rounded each in its own frame, leave no crack.
+// so that neighbouring patches, whose control points are rounded each in its own frame, leave no crack. The backs of
+// rims are no surface for rays that begin outside of the part's closed shells (SPEC.md, Rims); on which side a ray
+// begins is what most of seven rays from there say, a back met first meaning inside.
 // Of two hits whose distances differ by at most 1e-12 of themselves, that of the lower instance and then of the lower
 // face is the closest.
 #pragma once
@@ -55,9 +57,6 @@ public:
                 double reach_px = 1e-3) const;
 
 private:
-    struct PartTree {
-        reference::BoxTree tree; // part units
-    };
     struct Placement {
         std::array<long double, 9> to_part{};  // part units a mm
         std::array<long double, 3> moved_mm{}; // where part units' origin lies
@@ -65,14 +64,18 @@ private:
     };
     struct Walk;
 
+    void intersect_instance(uint instance, Walk& walk) const;
     void intersect_patch(uint patch, Walk& walk) const;
     void accept(uint patch, const reference::Root& root, double t, Walk& walk) const;
+    bool is_cut_rim(uint patch, const reference::Root& root, const std::array<double, 2>& uv, const Walk& walk) const;
+    bool begins_outside(const Walk& walk) const;
+    Vec3 outward_in_part(uint patch, const std::array<double, 2>& uv_patch) const;
     void finish(ReferenceHit& hit) const;
 
     const PackImage& image_;
     TrimReference trims_;
     std::vector<std::optional<reference::BezierReference>> beziers_; // of each patch that is one
-    std::vector<PartTree> parts_;
+    std::vector<reference::BoxTree> parts_;                          // over each part's patches, part units
     std::vector<Placement> placements_;
     reference::BoxTree placed_; // instances, world mm
 };

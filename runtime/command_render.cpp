@@ -112,7 +112,7 @@ int run_render(const RenderArguments& arguments)
     if (!scene.ok())
         return report_error(scene.error());
     const PackImage& image = (*scene)->pack.image;
-    if (const auto held = choose_trim(image, trim_mode(arguments.trim)); !held.ok())
+    if (const auto held = choose_trim(image, trim_mode(arguments.trim)); !held.ok() && arguments.device != "reference")
         return report_error(held.error());
     const Result<Camera> camera = camera_of(arguments.view, image, size->width, size->height);
     if (!camera.ok())

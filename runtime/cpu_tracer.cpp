@@ -1,6 +1,7 @@
 #include "runtime/cpu_lanes.h"
 #include "runtime/eye_side.h"
 #include "runtime/frame_effects.h"
+#include "runtime/frame_size.h"
 #include "runtime/thread_clock.h"
 #include "runtime/trace_one.h"
 #include "runtime/tracer.h"
@@ -22,20 +23,6 @@
 
 namespace trimray {
 namespace {
-
-void resize(Frame& frame, uint32_t width, uint32_t height)
-{
-    const size_t pixels = size_t(width) * height;
-    frame.width = width;
-    frame.height = height;
-    frame.rgba.resize(4 * pixels);
-    frame.depth_mm.resize(pixels);
-    frame.normal.resize(3 * pixels);
-    frame.uv.resize(2 * pixels);
-    frame.face.resize(pixels);
-    frame.instance.resize(pixels);
-    frame.certified.resize(pixels);
-}
 
 void add(WorkCounts& sum, const WorkCounts& part)
 {
@@ -60,12 +47,8 @@ public:
 
     Result<Frame> render(const RenderOptions& options, RenderStats& stats) override
     {
-        constexpr uint32_t kLargestSide = 65536; // pixels; and a picture of 2^30 in all
-        if (options.width == 0 || options.height == 0 || options.width > kLargestSide ||
-            options.height > kLargestSide || uint64_t(options.width) * options.height > 1u << 30)
-            return Error{ErrorCode::Usage, "size",
-                         fmt::format("{}x{} is not between 1x1 and {}x{} with at most 2^30 pixels", options.width,
-                                     options.height, kLargestSide, kLargestSide)};
+        if (const Status possible = check_size(options); !possible.ok())
+            return possible.error();
         const Result<TrimMode> trim = choose_trim(scene_->pack.image, options.trim);
         if (!trim.ok())
             return trim.error();

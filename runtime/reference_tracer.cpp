@@ -2,6 +2,7 @@
 // the other tracers are compared with.
 #include "format/closest_reference.h"
 #include "runtime/frame_effects.h"
+#include "runtime/frame_size.h"
 #include "runtime/image_io.h"
 #include "runtime/tracer.h"
 
@@ -53,12 +54,8 @@ public:
 
     Result<Frame> render(const RenderOptions& options, RenderStats& stats) override
     {
-        constexpr uint32_t kLargestSide = 65536; // pixels; and a picture of 2^30 in all
-        if (options.width == 0 || options.height == 0 || options.width > kLargestSide ||
-            options.height > kLargestSide || uint64_t(options.width) * options.height > 1u << 30)
-            return Error{ErrorCode::Usage, "size",
-                         fmt::format("{}x{} is not between 1x1 and {}x{} with at most 2^30 pixels", options.width,
-                                     options.height, kLargestSide, kLargestSide)};
+        if (const Status possible = check_size(options); !possible.ok())
+            return possible.error();
         if (has_effects(options))
             return Error{ErrorCode::Usage, "--device reference",
                          "draws no lines and smooths no borders; leave out --edges, --silhouettes, --style and "
@@ -72,7 +69,8 @@ public:
         stats.frame_ms.clear();
         stats.frame_cpu_ms.clear();
         stats.trim_queries.clear();
-        Frame frame = missed(options.width, options.height);
+        Frame frame;
+        resize(frame, options.width, options.height);
         tbb::task_arena arena(options.threads > 0 ? int(std::min(options.threads, 1024u))
                                                   : tbb::info::default_concurrency());
         for (uint32_t i = 0; i < std::max(options.frames, 1u); ++i) {
@@ -85,22 +83,6 @@ public:
     }
 
 private:
-    static Frame missed(uint32_t width, uint32_t height)
-    {
-        const size_t pixels = size_t(width) * height;
-        Frame frame;
-        frame.width = width;
-        frame.height = height;
-        frame.rgba.resize(4 * pixels);
-        frame.depth_mm.assign(pixels, std::numeric_limits<float>::infinity());
-        frame.normal.resize(3 * pixels);
-        frame.uv.resize(2 * pixels);
-        frame.face.assign(pixels, -1);
-        frame.instance.assign(pixels, -1);
-        frame.certified.resize(pixels);
-        return frame;
-    }
-
     void trace(const RenderOptions& options, WorkCounts& work, Frame& frame) const
     {
         const CameraRays rays = camera_rays(options.camera, options.width, options.height);
@@ -130,8 +112,11 @@ private:
                Frame& frame) const
     {
         frame.certified[pixel] = !hit.open && !hit.contact;
-        if (!hit.hit)
+        if (!hit.hit) { // the frame is new: zeros elsewhere
+            frame.depth_mm[pixel] = std::numeric_limits<float>::infinity();
+            frame.face[pixel] = frame.instance[pixel] = -1;
             return;
+        }
         const Vec3 to_eye = ray.direction * (-1 / length(ray.direction));
         const Vec3 normal = dot(hit.normal, hit.normal) > 0 ? hit.normal : to_eye;
         const PackImage& image = scene_->pack.image;

@@ -83,6 +83,7 @@ int measure(const std::string& path, const Request& request)
         return fail(path, scene.error().detail);
     const PackImage& image = (*scene)->pack.image;
     const ClosestReference closest(image);
+    int failed = 0;
     const Reach reach = [&image](const std::array<double, 3>& direction) {
         double largest = -std::numeric_limits<double>::infinity();
         for (const InstanceRecord& instance : image.instances)
@@ -103,8 +104,10 @@ int measure(const std::string& path, const Request& request)
                 return fail(view, "no such view");
             RenderStats stats;
             const Result<Frame> frame = (*tracer)->render(options, stats);
-            if (!frame.ok())
-                return fail(path, frame.error().detail);
+            if (!frame.ok()) {
+                failed = fail(path + ", " + view, frame.error().detail);
+                continue;
+            }
             const auto start = std::chrono::steady_clock::now();
             const AgainstReference result = compare_with_reference(*frame, options.camera, closest);
             const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - start;
@@ -114,7 +117,7 @@ int measure(const std::string& path, const Request& request)
             std::fflush(stdout);
         }
     }
-    return 0;
+    return failed;
 }
 
 } // namespace

@@ -385,6 +385,18 @@ class Render(CliTest):
         self.assertIn(device, done.stderr)
         self.assertNotIn("llvmpipe", device, "never a software driver unasked")
 
+    def test_the_reference_shows_what_the_others_show_and_refuses_what_it_cannot_do(self):
+        cpu = read_png(self.render("cpu.png", "--size", "64x48"))[2]
+        out = WORK / "reference.png"
+        report = self.json_of("render", PACK, "-o", out, "--size", "64x48", "--device", "reference", "--json")
+        self.assertEqual((report["device"], report["trim"]), ("reference", "reference"))
+        slow = read_png(out)[2]
+        self.assertEqual(alphas(cpu), alphas(slow))
+        self.assertLessEqual(max(abs(a - b) for a, b in zip(b"".join(cpu), b"".join(slow))), 1)
+        for option, value in [("--trim", "sdf"), ("--edges", "sharp"), ("--antialias", "trims")]:
+            self.fails(1, "render", PACK, "-o", WORK / "g.png", "--device", "reference", option, value,
+                       says=["--device reference", option])
+
     def test_modes_that_do_not_exist_name_those_that_do(self):
         for option, value in [("--closest", "stochastic"), ("--scene", "a.json")]:
             self.fails(4, "render", PACK, "-o", WORK / "f.png", option, value, says=[option])

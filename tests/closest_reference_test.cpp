@@ -491,6 +491,36 @@ TEST(ClosestReference, ADoubtfulRayIsOneWithinAThousandthOfAPixelOfARim)
     }
 }
 
+/// Two round discs of 20 mm, 4 mm apart, their outsides above and below, with rims as `flags` says.
+std::shared_ptr<const Scene> slab(uint flags)
+{
+    TracedScene scene;
+    scene.add(kKindPlane, 1, {0, 0, 0.2}, {1, 1});
+    scene.add(kKindPlane, 1, {0, 0, -0.2}, {1, 1});
+    for (const size_t face : {0u, 1u}) {
+        scene.trim(face, {shapes::circle(0.5, 0.5, 0.47, 0.47)});
+        scene.image.faces[face].flags |= flags | (face == 1 ? kFaceReversed : 0);
+    }
+    return scene.finish();
+}
+
+TEST(ClosestReference, RimsAreASurfaceFromWithinAndShowNoBacksFromOutside)
+{
+    const auto with = slab(4u << kFaceRimBit | 5u << (kFaceRimBit + kFaceRimBits)), without = slab(0);
+    const ClosestReference cut(with->pack.image), whole(without->pack.image);
+    const auto differing_pixels = [&](const Camera& camera) {
+        RenderOptions options = overview(120, 90);
+        options.camera = camera;
+        const AgainstReference result = compare_with_reference(draw(with, options).frame, camera, cut);
+        for (const uint64_t count : result.faults)
+            EXPECT_EQ(count, 0u);
+        const AgainstReference other = compare_with_reference(draw(with, options).frame, camera, whole);
+        return other.faults[size_t(Fault::FalseMiss)] + other.faults[size_t(Fault::WrongDepth)];
+    };
+    EXPECT_GT(differing_pixels({{0, -40, -12}, {0, 0, 0}, {0, 0, 1}, 35}), 50u) << "the upper disc's back, from below";
+    EXPECT_EQ(differing_pixels({{0.3, -0.2, 0.1}, {0, 0, 2}, {0, 1, 0}, 160}), 0u) << "from within";
+}
+
 TEST(ClosestReference, AgreesWithTheCpuTracerOnEveryKind)
 {
     const auto scene = all_kinds().finish();
