@@ -137,9 +137,9 @@ Interval slope(const Net& net, int axis, const Combined& f)
 /// One line against one patch. Net points are (a, b, c, w): w times the distances from two planes through the line, w
 /// times the way along the line, and the weight.
 ///
-/// Rounding: a point's a, b and c are w times numbers of at most `reach`, so their first rounding is at most 8 kUnit
-/// reach w, and each step of de Casteljau's adds at most 3 kUnit reach w of the new point. So |error| <= rounding * w,
-/// with `rounding` counted along for each box, in patch units.
+/// Rounding: a point's a, b and c are w times numbers of at most `reach`, so what they lose at first, with the planes'
+/// own rounding, is at most 16 kUnit reach w, and each step of de Casteljau's adds at most 3 kUnit reach w of the new
+/// point. So |error| <= rounding * w, with `rounding` counted along for each box, in patch units.
 class PatchSearch {
 public:
     PatchSearch(const BezierReference& patch, const Ray& ray, double t_lo, double t_hi, const TakeRoot& take)
@@ -172,7 +172,7 @@ public:
             reach = std::max(reach, length(wp) / p[3]);
         }
         reach_ = reach + length(ray_.origin);
-        whole.rounding = 8 * kUnit * reach_;
+        whole.rounding = 16 * kUnit * reach_;
         whole.near = nearest(whole);
         stack_.push_back(std::move(whole));
         while (!stack_.empty()) {

@@ -118,9 +118,9 @@ Result<std::unique_ptr<Tracer>> make_cpu_tracer(std::shared_ptr<const Scene> sce
 Result<std::unique_ptr<Tracer>> make_vulkan_tracer(std::shared_ptr<const Scene> scene, bool allow_software,
                                                    bool validation);
 
-/// The reference for closest hits (format/closest_reference.h): in double, with trims counted likewise, some thousand
-/// rays a second a thread. Its `certified` says that the ray touches nothing and no search was given up. Its render
-/// fails for effects and for trim modes other than auto, exact and reference: Usage.
+/// The reference for closest hits (format/closest_reference.h): in double, with trims counted likewise, about a hundred
+/// thousand rays a second a thread. Its `certified` says that the ray touches nothing and no search was given up. Its
+/// render fails for effects and for trim modes other than auto, exact and reference: Usage.
 std::unique_ptr<Tracer> make_reference_tracer(std::shared_ptr<const Scene> scene);
 
 /// One ray, in world mm; `direction` need not be unit, distance_mm is along the unit direction. It meets backs wherever

@@ -112,6 +112,9 @@ int measure(const std::string& path, const Request& request)
             const AgainstReference result = compare_with_reference(*frame, options.camera, closest);
             const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - start;
             Json line{{"pack", path}, {"device", stats.device}, {"view", view}, {"seconds", spent.count()}};
+            line["eye"] = options.camera.eye;
+            line["target"] = options.camera.target;
+            line["up"] = options.camera.up;
             line.update(to_json(result, request.listed));
             fmt::print("{}\n", line.dump());
             std::fflush(stdout);
