@@ -92,6 +92,13 @@ struct ClosestReference::Walk {
 
     /// Beyond it nothing can be the closest any more.
     double t_hi() const { return best_t * (1 + kTie); }
+    bool meets_back(const Vec3& outward_in_part) const
+    {
+        Real along = 0;
+        for (size_t i = 0; i < 3; ++i)
+            along += direction_part[i] * outward_in_part[i];
+        return along > 0;
+    }
 };
 
 ClosestReference::ClosestReference(const PackImage& image)
@@ -194,12 +201,8 @@ bool ClosestReference::is_cut_rim(uint patch_id, const Root& root, const std::ar
     const uint face_id = image_.patches[patch_id].face, flags = image_.faces[face_id].flags;
     if (walk.shells_alone || (flags & kFaceRims) == 0)
         return false;
-    const Vec3 outward = outward_in_part(patch_id, {root.u, root.v});
-    Real along = 0;
-    for (size_t i = 0; i < 3; ++i)
-        along += walk.direction_part[i] * outward[i];
-    if (!(along > 0))
-        return false; // a front
+    if (!walk.meets_back(outward_in_part(patch_id, {root.u, root.v})))
+        return false;
     const double width[2] = {std::ldexp(1.0, -int(flags >> kFaceRimBit & kFaceRimMask)),
                              std::ldexp(1.0, -int(flags >> (kFaceRimBit + kFaceRimBits) & kFaceRimMask))};
     for (int corner = 0; corner < 4; ++corner) {
@@ -228,13 +231,7 @@ bool ClosestReference::begins_outside(const Walk& walk) const
         probe.speed = reference::length(direction);
         probe.shells_alone = true;
         intersect_instance(walk.instance, probe);
-        if (!probe.best.hit)
-            continue;
-        const Vec3 outward = outward_in_part(probe.best.patch, probe.best.uv_patch);
-        Real along = 0;
-        for (size_t i = 0; i < 3; ++i)
-            along += probe.direction_part[i] * outward[i];
-        backs += along > 0;
+        backs += probe.best.hit && probe.meets_back(outward_in_part(probe.best.patch, probe.best.uv_patch));
     }
     return 2 * backs < kDirections.size();
 }

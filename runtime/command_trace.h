@@ -27,8 +27,8 @@ Status check_choice(const Choice& choice, const std::string& value);
 /// Domain: names of trim_choice().available.
 TrimMode trim_mode(const std::string& name);
 
-/// A tracer for `device`: "cpu", "vulkan" (software drivers too), "reference", or "auto": a hardware GPU where there is one, else
-/// the CPU; `note` says which and why. Fails: NoDevice, DeviceFailed, UnsupportedPackFeature.
+/// A tracer for `device`: "cpu", "vulkan" (software drivers too), "reference", or "auto": a hardware GPU where there is
+/// one, else the CPU; `note` says which and why. Fails: NoDevice, DeviceFailed, UnsupportedPackFeature.
 Result<std::unique_ptr<Tracer>> make_tracer(const std::shared_ptr<const Scene>& scene, const std::string& device,
                                             std::string& note);
 
