@@ -47,6 +47,7 @@ struct AgainstReference {
     uint64_t open = 0;                                  // pixels at which the reference gave a search up
     double largest_depth_px = 0, mean_depth_px = 0;     // |dt| in footprints where hit and face agree
     double largest_normal_deg = 0, mean_normal_deg = 0; // likewise
+    std::array<uint32_t, 2> normal_pixel{};             // where the largest is
     std::vector<FaultyPixel> pixels;                    // every fault and doubtful one, row by row
 };
 
@@ -106,7 +107,10 @@ inline AgainstReference compare_with_reference(const Frame& frame, const Camera&
                 const double deg = kDegrees * std::atan2(reference::length(reference::cross(n, hit.normal)),
                                                          reference::dot(n, hit.normal));
                 row.mean_normal_deg += deg;
-                row.largest_normal_deg = std::max(row.largest_normal_deg, deg);
+                if (deg > row.largest_normal_deg) {
+                    row.largest_normal_deg = deg;
+                    row.normal_pixel = {x, y};
+                }
                 continue;
             }
             fault.x = x;
@@ -151,7 +155,10 @@ inline AgainstReference compare_with_reference(const Frame& frame, const Camera&
         all.not_finite += row.not_finite;
         all.open += row.open;
         all.largest_depth_px = std::max(all.largest_depth_px, row.largest_depth_px);
-        all.largest_normal_deg = std::max(all.largest_normal_deg, row.largest_normal_deg);
+        if (row.largest_normal_deg > all.largest_normal_deg) {
+            all.largest_normal_deg = row.largest_normal_deg;
+            all.normal_pixel = row.normal_pixel;
+        }
         all.mean_depth_px += row.mean_depth_px;
         all.mean_normal_deg += row.mean_normal_deg;
         agree += row.both_hit;

@@ -66,7 +66,7 @@ Json to_json(const AgainstReference& a, size_t listed)
             {"not_finite", a.not_finite},
             {"open", a.open},
             {"depth_px", {{"largest", a.largest_depth_px}, {"mean", a.mean_depth_px}}},
-            {"normal_deg", {{"largest", a.largest_normal_deg}, {"mean", a.mean_normal_deg}}},
+            {"normal_deg", {{"largest", a.largest_normal_deg}, {"mean", a.mean_normal_deg}, {"at", a.normal_pixel}}},
             {"pixels", pixels}};
 }
 
