@@ -18,15 +18,22 @@
 #include <BRepTools.hxx>
 #include <BRep_Builder.hxx>
 #include <BRep_Tool.hxx>
+#include <BinTools.hxx>
 #include <Geom2d_Curve.hxx>
 #include <GeomAPI_Interpolate.hxx>
 #include <Geom_BSplineCurve.hxx>
 #include <Geom_Surface.hxx>
+#include <Interface_Static.hxx>
+#include <Message.hxx>
+#include <Message_Messenger.hxx>
+#include <STEPControl_Controller.hxx>
+#include <STEPControl_Writer.hxx>
 #include <Standard_Failure.hxx>
 #include <TColgp_HArray1OfPnt.hxx>
 #include <TopExp_Explorer.hxx>
 #include <TopLoc_Location.hxx>
 #include <TopoDS.hxx>
+#include <TopoDS_Compound.hxx>
 #include <TopoDS_Edge.hxx>
 #include <TopoDS_Face.hxx>
 #include <TopoDS_Wire.hxx>
@@ -122,6 +129,39 @@ TopoDS_Shape make(Solid solid)
     }
 }
 
+/// So that nothing lies along an axis.
+gp_Trsf turned()
+{
+    gp_Trsf turn;
+    turn.SetRotation(gp_Ax1(gp_Pnt(3, 1, 2), gp_Dir(1, 2, 3)), 0.7);
+    return turn;
+}
+
+/// A compound that places the shape.
+TopoDS_Shape placed(const TopoDS_Shape& shape, const gp_Trsf& transform)
+{
+    const BRep_Builder builder;
+    TopoDS_Compound all;
+    builder.MakeCompound(all);
+    builder.Add(all, shape.Moved(TopLoc_Location(transform)));
+    return all;
+}
+
+/// Quietly. `unit` is that of the file; `assembly`: a compound's placements stay placements.
+bool write_step(const TopoDS_Shape& shape, const char* unit, bool assembly, const std::string& path)
+{
+    const Message_SequenceOfPrinters printers = Message::DefaultMessenger()->Printers();
+    Message::DefaultMessenger()->ChangePrinters().Clear();
+    STEPControl_Controller::Init();
+    Interface_Static::SetCVal("write.step.unit", unit);
+    Interface_Static::SetIVal("write.step.assembly", assembly);
+    STEPControl_Writer writer;
+    const bool written =
+        writer.Transfer(shape, STEPControl_AsIs) == IFSelect_RetDone && writer.Write(path.c_str()) == IFSelect_RetDone;
+    Message::DefaultMessenger()->ChangePrinters() = printers;
+    return written;
+}
+
 bool valid_and_closed(const TopoDS_Shape& shape)
 {
     if (shape.IsNull() || !BRepCheck_Analyzer(shape).IsValid())
@@ -158,10 +198,27 @@ const char* solid_name(Solid solid)
 bool write_closed_solid(Solid solid, const std::string& path)
 {
     try {
-        gp_Trsf turned;
-        turned.SetRotation(gp_Ax1(gp_Pnt(3, 1, 2), gp_Dir(1, 2, 3)), 0.7);
-        const TopoDS_Shape shape = BRepBuilderAPI_Transform(make(solid), turned, true).Shape();
+        const TopoDS_Shape shape = BRepBuilderAPI_Transform(make(solid), turned(), true).Shape();
         return valid_and_closed(shape) && BRepTools::Write(shape, path.c_str());
+    } catch (const Standard_Failure&) {
+        return false;
+    }
+}
+
+bool write_laid_out(Solid solid, const Layout& layout, const std::string& path)
+{
+    try {
+        gp_Trsf scaled, moved;
+        scaled.SetScale(gp_Pnt(), layout.scale);
+        moved.SetTranslation(gp_Vec(layout.shift_mm[0], layout.shift_mm[1], layout.shift_mm[2]));
+        TopoDS_Shape shape =
+            BRepBuilderAPI_Transform(make(solid), (layout.placed ? gp_Trsf() : moved) * scaled * turned(), true)
+                .Shape();
+        if (layout.placed)
+            shape = placed(shape, moved);
+        if (!path.ends_with(".step"))
+            return BinTools::Write(shape, path.c_str());
+        return write_step(shape, layout.unit, layout.placed, path);
     } catch (const Standard_Failure&) {
         return false;
     }

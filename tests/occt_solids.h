@@ -1,6 +1,7 @@
 // Closed solids made with the CAD kernel, written as BREP.
 #pragma once
 
+#include <array>
 #include <string>
 
 namespace trimray::oracle {
@@ -19,6 +20,18 @@ const char* solid_name(Solid solid);
 
 /// One solid, about 100 mm in size, along no axis. False: not made, or not valid and closed by the kernel's own check.
 bool write_closed_solid(Solid solid, const std::string& path);
+
+/// Where a solid lies in a file, how large it is there, and how the file says so.
+struct Layout {
+    double scale = 1; // about the origin, before it is moved
+    std::array<double, 3> shift_mm{};
+    bool placed = false;     // moved by a placement of the solid, whose own coordinates stay as they were
+    const char* unit = "MM"; // of a STEP file: "MM", "M", "INCH", "KM", "UM"
+};
+
+/// The solid of write_closed_solid, laid out so; as STEP where the path ends in .step, else as binary BREP, which keeps
+/// every bit of a number. False: not made.
+bool write_laid_out(Solid solid, const Layout& layout, const std::string& path);
 
 /// A surface that closes on itself, as a face of its own about the origin, its axis z and its seam at +x: a sphere of
 /// radius 20, a torus of radii 30 and 8, or a cylinder of radius 20 from z = -15 to 15.

@@ -1,20 +1,14 @@
 // Rays through the whole chain (file, model, pack bytes, tracer) against the CAD kernel's own intersections: the CPU
 // tracer's, and those of the reference that the tracers are measured with.
-#include "format/pack_reader.h"
-#include "format/pack_writer.h"
-#include "preprocess/build_pack.h"
-#include "preprocess/cad_import.h"
-#include "runtime/tracer.h"
 #include "tests/occt_models.h"
 #include "tests/occt_oracle.h"
+#include "tests/traced_file.h"
 
 #include <fmt/core.h>
 #include <gtest/gtest.h>
 
 #include <array>
 #include <cmath>
-#include <filesystem>
-#include <unistd.h>
 
 namespace trimray {
 namespace {
@@ -29,16 +23,6 @@ std::string model_path(const std::string& name)
     return std::string(TRIMRAY_TESTS_DIR) + "/models/" + name;
 }
 
-/// A file of this process in the temporary folder, gone when the test ends.
-struct TemporaryFile {
-    std::string path;
-    explicit TemporaryFile(const std::string& name)
-        : path((std::filesystem::temp_directory_path() / fmt::format("trimray_{}_{}", getpid(), name)).string())
-    {
-    }
-    ~TemporaryFile() { std::filesystem::remove(path); }
-};
-
 /// Two views from outside, along no axis and no diagonal.
 std::vector<oracle::View> views(const oracle::Oracle& occt)
 {
@@ -47,27 +31,6 @@ std::vector<oracle::View> views(const oracle::Oracle& occt)
         result.push_back(
             oracle::frame_box(occt.lo_mm(), occt.hi_mm(), towards, {0, 0, 1}, double(kWidth) / kHeight, kFovDeg));
     return result;
-}
-
-/// File -> model -> pack image -> bytes -> pack -> scene.
-std::shared_ptr<const Scene> scene_through_bytes(const std::string& path)
-{
-    const Result<CadModel> model = import_cad(path, {}, {});
-    if (!model.ok()) {
-        ADD_FAILURE() << path << ": " << model.error().detail;
-        return nullptr;
-    }
-    BuildReport report;
-    const PackImage image = build_pack(*model, {}, report);
-    EXPECT_EQ(report.faces, report.converted) << path;
-    Result<LoadedPack> pack = decode_pack(encode_pack(image, {}), {});
-    if (!pack.ok()) {
-        ADD_FAILURE() << path << ": " << pack.error().where << ": " << pack.error().detail;
-        return nullptr;
-    }
-    auto scene = std::make_shared<Scene>();
-    scene->pack = std::move(pack).value();
-    return scene;
 }
 
 std::vector<float> depths(Tracer& tracer, const oracle::View& view)
@@ -79,13 +42,7 @@ std::vector<float> depths(Tracer& tracer, const oracle::View& view)
     options.trim = TrimMode::Exact;
     options.shade = false;
     options.error_px = 1e-4f; // the dial for speed turned down: what is left is ours to explain
-    RenderStats stats;
-    Result<Frame> frame = tracer.render(options, stats);
-    if (!frame.ok()) {
-        ADD_FAILURE() << frame.error().detail;
-        return {};
-    }
-    return frame->depth_mm;
+    return picture(tracer, options).depth_mm;
 }
 
 std::string describe(const oracle::Agreement& agreement)
@@ -116,7 +73,7 @@ void expect_agreement(const std::string& path)
     std::string error;
     const auto occt = oracle::Oracle::load(path, {}, error);
     ASSERT_TRUE(occt) << path << ": " << error;
-    const auto scene = scene_through_bytes(path);
+    const auto scene = scene_of_file(path);
     ASSERT_TRUE(scene);
     auto cpu = make_cpu_tracer(scene);
     ASSERT_TRUE(cpu.ok()) << cpu.error().detail;

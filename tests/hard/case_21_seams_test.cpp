@@ -4,6 +4,7 @@
 #include "preprocess/cad_import.h"
 #include "tests/hard/trim_modes.h"
 #include "tests/occt_solids.h"
+#include "tests/traced_file.h"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -48,20 +49,6 @@ std::shared_ptr<const Scene> drilled_cylinder(int sixteenths)
     return scene_of([&](const std::string& path) { return oracle::write_drilled_seam(turn, path); });
 }
 
-/// Null where there is no Vulkan driver, which it prints.
-std::unique_ptr<Tracer> tracer_of(const std::shared_ptr<const Scene>& scene, bool vulkan)
-{
-    keep_vulkan_loaded();
-    auto tracer = vulkan ? make_vulkan_tracer(scene, true, false) : make_cpu_tracer(scene);
-    if (tracer.ok())
-        return std::move(*tracer);
-    if (vulkan && tracer.error().code == ErrorCode::NoDevice)
-        std::cout << "skipped vulkan: " << tracer.error().detail << "\n";
-    else
-        ADD_FAILURE() << tracer.error().where << ": " << tracer.error().detail;
-    return nullptr;
-}
-
 RenderOptions options_of(const Camera& camera, const TrimWay& way)
 {
     RenderOptions options;
@@ -71,17 +58,6 @@ RenderOptions options_of(const Camera& camera, const TrimWay& way)
     options.shade = false;
     options.error_px = 1e-4f;
     return options;
-}
-
-/// No pixels where the tracer fails, which is a failure of the test.
-Frame picture(Tracer& tracer, const RenderOptions& options)
-{
-    RenderStats stats;
-    Result<Frame> frame = tracer.render(options, stats);
-    if (frame.ok())
-        return std::move(*frame);
-    ADD_FAILURE() << frame.error().where << ": " << frame.error().detail;
-    return {};
 }
 
 bool differ(const Frame& a, const Frame& b, size_t pixel)
