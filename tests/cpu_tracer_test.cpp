@@ -345,34 +345,6 @@ TEST(cpu_tracer, refuses_trim_modes_that_the_pack_has_no_data_for)
     }
 }
 
-TEST(cpu_tracer, a_mirrored_instance_is_the_mirror_image)
-{
-    const auto straight = all_kinds().finish();
-    TracedScene model = all_kinds();
-    model.place({-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0});
-    const auto mirrored = model.finish();
-    Camera camera = kOverview;
-    const Frame a = render(straight, camera).frame;
-    camera.eye[0] = -camera.eye[0];
-    const Frame b = render(mirrored, camera).frame;
-    size_t same = 0;
-    for (uint32_t y = 0; y < a.height; ++y) {
-        for (uint32_t x = 0; x < a.width; ++x) {
-            const size_t i = size_t(y) * a.width + x, j = size_t(y) * a.width + (a.width - 1 - x);
-            if (a.face[i] != b.face[j])
-                continue;
-            ++same;
-            if (a.face[i] < 0)
-                continue;
-            EXPECT_NEAR(a.depth_mm[i], b.depth_mm[j], 2e-4);
-            EXPECT_NEAR(a.normal[3 * i], -b.normal[3 * j], 2e-3);
-            EXPECT_NEAR(a.normal[3 * i + 1], b.normal[3 * j + 1], 2e-3);
-            EXPECT_NEAR(a.normal[3 * i + 2], b.normal[3 * j + 2], 2e-3);
-        }
-    }
-    EXPECT_GE(same, a.face.size() - 5);
-}
-
 TEST(cpu_tracer, sees_the_same_from_a_million_sizes_away)
 {
     const auto scene = all_kinds().finish();

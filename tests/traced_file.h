@@ -90,8 +90,9 @@ inline Frame picture(Tracer& tracer, const RenderOptions& options)
 inline constexpr double kDepth_px = 1e-3, kNormal_deg = 0.02;
 
 /// The picture, which is expected to be the reference's; prints what it is off by. No pixels where there is no tracer.
+/// `most_beside`: false hits that are let pass, of rays that pass a silhouette within 0.01 pixels.
 inline Frame right_picture(const std::shared_ptr<const Scene>& scene, const RenderOptions& options, bool vulkan,
-                           const std::string& name)
+                           const std::string& name, uint64_t most_beside = 0)
 {
     const auto tracer = tracer_of(scene, vulkan);
     if (!tracer)
@@ -103,9 +104,16 @@ inline Frame right_picture(const std::shared_ptr<const Scene>& scene, const Rend
                              "degrees\n",
                              name, vulkan ? "vulkan" : "cpu", found.both_hit, found.rays, sum(found.faults),
                              sum(found.doubtful), found.largest_depth_px, found.largest_normal_deg);
-    EXPECT_GT(found.both_hit, found.rays / 8) << name << ": the view shows nothing";
-    for (size_t fault = 0; fault < kFaultCount; ++fault)
-        EXPECT_EQ(found.faults[fault], 0u) << name << ": " << kFaultNames[fault];
+    EXPECT_GT(found.both_hit, found.rays / 20) << name << ": the view shows nothing";
+    uint64_t beside = 0;
+    for (const FaultyPixel& p : found.pixels) {
+        beside += p.fault == Fault::FalseHit && p.doubt != Doubt::Tangent && p.hair_px <= 0.01;
+        std::cout << fmt::format("  {} at {}, {}: {} mm, face {}, instead of {} mm, face {}; {} px from a rim\n",
+                                 kFaultNames[size_t(p.fault)], p.x, p.y, p.tracer_mm, p.tracer_face, p.reference_mm,
+                                 p.reference_face, p.hair_px);
+    }
+    EXPECT_EQ(sum(found.faults) - beside, 0u) << name;
+    EXPECT_LE(beside, most_beside) << name;
     EXPECT_EQ(found.not_finite, 0u) << name;
     EXPECT_LE(found.largest_depth_px, kDepth_px) << name;
     EXPECT_LE(found.largest_normal_deg, kNormal_deg) << name;
