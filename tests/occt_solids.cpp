@@ -272,4 +272,19 @@ bool write_drilled_seam(double turn, const std::string& path)
     }
 }
 
+bool write_slotted_cylinder(const std::string& path)
+{
+    try {
+        const gp_Ax2 axes(gp_Pnt(), gp_Dir(0, 0, 1), gp_Dir(std::cos(kSlotSeam), std::sin(kSlotSeam), 0));
+        gp_Trsf turn;
+        turn.SetRotation(gp_Ax1(gp_Pnt(0, 0, 30), gp_Dir(1, 0, 0)), kSlotTurn);
+        const TopoDS_Shape box = BRepPrimAPI_MakeBox(gp_Pnt(10, -5, 15), gp_Pnt(40, 5, 45)).Shape();
+        const TopoDS_Shape slot = BRepBuilderAPI_Transform(box, turn, true).Shape();
+        const TopoDS_Shape shape = BRepAlgoAPI_Cut(BRepPrimAPI_MakeCylinder(axes, 20, 60).Shape(), slot).Shape();
+        return valid_and_closed(shape) && BRepTools::Write(shape, path.c_str());
+    } catch (const Standard_Failure&) {
+        return false;
+    }
+}
+
 } // namespace trimray::oracle

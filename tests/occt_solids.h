@@ -51,4 +51,10 @@ bool write_closed_face(ClosedFace face, const std::string& path);
 /// is turned by `turn` radians from the hole. False: not made.
 bool write_drilled_seam(double turn, const std::string& path);
 
+/// A cylinder of radius 20 around z from 0 to 60, its seam 2 radians from +x, with a slot milled into its wall: a box
+/// of 10 by 30 mm about (x, 0, 30), from x = 10 outwards, turned by kSlotTurn about x, the long side along z where that
+/// is 0. False: not made.
+inline constexpr double kSlotTurn = 0.5, kSlotSeam = 2;
+bool write_slotted_cylinder(const std::string& path);
+
 } // namespace trimray::oracle
