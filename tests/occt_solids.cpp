@@ -36,6 +36,8 @@
 #include <TopoDS_Compound.hxx>
 #include <TopoDS_Edge.hxx>
 #include <TopoDS_Face.hxx>
+#include <TopoDS_Shell.hxx>
+#include <TopoDS_Solid.hxx>
 #include <TopoDS_Wire.hxx>
 #include <gp_Ax1.hxx>
 #include <gp_Ax2.hxx>
@@ -282,6 +284,31 @@ bool write_slotted_cylinder(const std::string& path)
         const TopoDS_Shape slot = BRepBuilderAPI_Transform(box, turn, true).Shape();
         const TopoDS_Shape shape = BRepAlgoAPI_Cut(BRepPrimAPI_MakeCylinder(axes, 20, 60).Shape(), slot).Shape();
         return valid_and_closed(shape) && BRepTools::Write(shape, path.c_str());
+    } catch (const Standard_Failure&) {
+        return false;
+    }
+}
+
+bool write_flipped(Solid solid, Flip flip, const std::string& path)
+{
+    try {
+        const TopoDS_Shape shape = BRepBuilderAPI_Transform(make(solid), turned(), true).Shape();
+        const BRep_Builder builder;
+        TopoDS_Shell shell;
+        builder.MakeShell(shell);
+        for (TopExp_Explorer face(shape, TopAbs_FACE); face.More(); face.Next()) {
+            const bool first = shell.NbChildren() == 0;
+            const bool turn = flip == Flip::Faces || (flip == Flip::OneFace && first);
+            builder.Add(shell, turn ? face.Current().Reversed() : face.Current());
+        }
+        shell.Closed(true);
+        TopoDS_Solid flipped;
+        builder.MakeSolid(flipped);
+        builder.Add(flipped, shell);
+        TopoDS_Compound all; // a file's only shape is taken to be the right way round
+        builder.MakeCompound(all);
+        builder.Add(all, flip == Flip::Solid ? flipped.Reversed() : TopoDS_Shape(flipped));
+        return BRepTools::Write(all, path.c_str());
     } catch (const Standard_Failure&) {
         return false;
     }

@@ -57,4 +57,15 @@ bool write_drilled_seam(double turn, const std::string& path);
 inline constexpr double kSlotTurn = 0.5, kSlotSeam = 2;
 bool write_slotted_cylinder(const std::string& path);
 
+/// What is wrong with the orientation of a solid.
+enum class Flip {
+    None,
+    OneFace, // the first face points inwards
+    Faces,   // all faces do: the solid is inside out
+    Solid,   // the faces point outwards, but the solid that holds them is reversed
+};
+
+/// A solid of write_closed_solid with its faces turned so, in the same order. False: not made.
+bool write_flipped(Solid solid, Flip flip, const std::string& path);
+
 } // namespace trimray::oracle
