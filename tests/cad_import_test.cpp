@@ -424,18 +424,6 @@ TEST(cad_import, poles_are_degenerate_uses_and_seams_are_marked)
     EXPECT_EQ(seam, 2);
 }
 
-// HARD_CASES 23
-TEST(cad_import, a_plane_without_a_border_is_dropped_with_the_reason)
-{
-    const std::string path = scratch("unbounded.brep");
-    ASSERT_TRUE(oracle::write_unbounded_plane(path));
-    const CadModel model = model_of(path);
-    EXPECT_EQ(face_count(model), 1u);
-    ASSERT_EQ(model.dropped.size(), 1u);
-    EXPECT_THAT(model.dropped[0].reason, HasSubstr("infinite"));
-    EXPECT_EQ(model.dropped[0].face_in_part, 1u);
-}
-
 TEST(cad_import, proxy_triangles_name_faces_and_stay_on_the_model)
 {
     const CadModel model = model_of(model_path("unit_sphere.stp"));

@@ -24,13 +24,16 @@
 #include <Geom_BSplineCurve.hxx>
 #include <Geom_BSplineSurface.hxx>
 #include <Geom_BezierCurve.hxx>
+#include <Geom_ConicalSurface.hxx>
 #include <Geom_CylindricalSurface.hxx>
 #include <Geom_Ellipse.hxx>
 #include <Geom_OffsetSurface.hxx>
+#include <Geom_Plane.hxx>
 #include <Geom_RectangularTrimmedSurface.hxx>
 #include <Geom_SurfaceOfLinearExtrusion.hxx>
 #include <Geom_SurfaceOfRevolution.hxx>
 #include <IGESControl_Writer.hxx>
+#include <Precision.hxx>
 #include <STEPControl_Reader.hxx>
 #include <Standard_Failure.hxx>
 #include <TColgp_Array1OfPnt.hxx>
@@ -41,7 +44,9 @@
 #include <TopoDS_Compound.hxx>
 #include <gp_Ax1.hxx>
 #include <gp_Ax2.hxx>
+#include <gp_Ax3.hxx>
 #include <gp_Circ.hxx>
+#include <gp_Cylinder.hxx>
 #include <gp_Pln.hxx>
 #include <gp_Trsf.hxx>
 
@@ -227,14 +232,50 @@ bool write_placed_copies(const std::string& from, const std::string& path)
     }
 }
 
-bool write_unbounded_plane(const std::string& path)
+bool write_pieces_of_endless_surfaces(const std::string& path)
 {
     try {
         BRep_Builder builder;
         TopoDS_Compound all;
         builder.MakeCompound(all);
-        builder.Add(all, BRepBuilderAPI_MakeFace(gp_Pln(gp_Pnt(0, 0, 0), gp_Dir(0, 0, 1)), 0, 1, 0, 1).Shape());
-        builder.Add(all, BRepBuilderAPI_MakeFace(gp_Pln(gp_Pnt(0, 0, 5), gp_Dir(0, 0, 1))).Shape());
+        const auto add = [&](const Handle(Geom_Surface) & surface, double u0, double u1, double v0, double v1) {
+            builder.Add(all, BRepBuilderAPI_MakeFace(surface, u0, u1, v0, v1, kFaceTolerance).Shape());
+        };
+        const auto axes = [](double x) { return gp_Ax3(gp_Pnt(x, 0, 0), gp_Dir(0, 0, 1)); };
+        const Handle(Geom_Surface) plane = new Geom_Plane(axes(0));
+        const Handle(Geom_Surface) wave = new Geom_SurfaceOfLinearExtrusion(
+            Handle(Geom_Curve)::DownCast(wavy_curve(0)->Translated(gp_Vec(40, -16, 0))), gp_Dir(0, 0, 1));
+        add(plane, -10, 10, -10, 10);
+        add(new Geom_CylindricalSurface(axes(25), 8), 0.3, 2.5, 2, 18);
+        add(new Geom_ConicalSurface(axes(80), 0.3, 4), 3, 6, 1, 20);
+        double u0 = 0, u1 = 0, v0 = 0, v1 = 0;
+        wave->Bounds(u0, u1, v0, v1);
+        add(wave, u0, u1, 3, 17);
+        add(new Geom_OffsetSurface(new Geom_Plane(axes(100)), 5), -10, 10, -10, 10);
+        add(new Geom_OffsetSurface(wave, 3), u0, u1, 5, 15);
+        return write_shape(all, path);
+    } catch (const Standard_Failure&) {
+        return false;
+    }
+}
+
+bool write_endless_faces(const std::string& path)
+{
+    try {
+        BRep_Builder builder;
+        TopoDS_Compound all;
+        builder.MakeCompound(all);
+        const gp_Pln ground(gp_Pnt(0, 0, 0), gp_Dir(0, 0, 1)), above(gp_Pnt(0, 0, 5), gp_Dir(0, 0, 1));
+        const double end = Precision::Infinite();
+        builder.Add(all, BRepBuilderAPI_MakeFace(ground, 0, 1, 0, 1).Shape());
+        builder.Add(all, BRepBuilderAPI_MakeFace(above).Shape());
+        const gp_Ax3 axes(gp_Pnt(20, 0, 0), gp_Dir(0, 0, 1));
+        builder.Add(all, BRepBuilderAPI_MakeFace(gp_Cylinder(axes, 5)).Shape());
+        const Handle(Geom_Surface) wave = new Geom_SurfaceOfLinearExtrusion(wavy_curve(0), gp_Dir(0, 0, 1));
+        builder.Add(all, BRepBuilderAPI_MakeFace(wave, kFaceTolerance).Shape());
+        builder.Add(all, BRepBuilderAPI_MakeFace(above, 0, end, -end, end).Shape());
+        const TopoDS_Face plane = BRepBuilderAPI_MakeFace(above).Face();
+        builder.Add(all, BRepPrimAPI_MakeHalfSpace(plane, gp_Pnt(0, 0, 9)).Solid());
         return write_shape(all, path);
     } catch (const Standard_Failure&) {
         return false;

@@ -19,8 +19,13 @@ bool write_left_handed_copy(const std::string& from, const std::string& path);
 /// One shape of a file, placed three times: as it is, turned and moved, and mirrored.
 bool write_placed_copies(const std::string& from, const std::string& path);
 
-/// A square face beside a plane without any border, which nothing can show.
-bool write_unbounded_plane(const std::string& path);
+/// Six faces, each a piece of a surface that has no end: a plane, a cylinder, a cone, an extrusion, and the offsets of
+/// a plane and of an extrusion. They lie between (-15, -15, 0) and (115, 15, 20). False: not written.
+bool write_pieces_of_endless_surfaces(const std::string& path);
+
+/// A square face, a whole plane, a whole cylinder, a whole extrusion, half a plane, and the plane that bounds half of
+/// space: none but the first has an end, so nothing can show them.
+bool write_endless_faces(const std::string& path);
 
 /// One shape of a file in a compound, at its own place and a second file's worth away at `scale` times its size.
 bool write_scaled_neighbour(const std::string& from, const std::string& other, double scale, const std::string& path);
