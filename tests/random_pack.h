@@ -9,6 +9,16 @@
 
 namespace trimray::test {
 
+/// A leaf's rectangle: uv_patch, or uv_face of a native surface.
+struct UvRect {
+    double lo[2], hi[2];
+};
+inline UvRect uv_of(const LeafRecord& leaf)
+{
+    return {{(leaf.uv_lo & 0xffffu) / 32768.0, (leaf.uv_lo >> 16) / 32768.0},
+            {(leaf.uv_hi & 0xffffu) / 32768.0, (leaf.uv_hi >> 16) / 32768.0}};
+}
+
 /// A pack of `parts` parts with `faces` faces each, native and spline in turn, and each part placed twice.
 /// Part `empty_part` has none.
 inline PackImage random_pack(uint32_t seed, uint parts, uint faces, uint empty_part = ~0u)

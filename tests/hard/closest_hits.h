@@ -1,0 +1,122 @@
+// A scene's pictures by both tracers, scored against the reference for closest hits in the units of the hard cases.
+#pragma once
+
+#include "tests/against_reference.h"
+#include "tests/keep_vulkan_loaded.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <functional>
+#include <iostream>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace trimray::hard {
+
+/// Of pictures that one tracer made.
+struct Score {
+    std::string tracer; // "cpu" or "vulkan"
+    uint64_t rays = 0, hits = 0;
+    // of rays that the reference is sure of: those that stay what they are where they move by 1e-3 pixels. A hit that
+    // lies behind the true one is a false miss too, one before it a false hit
+    uint64_t false_misses = 0, false_hits = 0, wrong_faces = 0;
+    uint64_t tangent = 0;    // wrong, but such a move decides them
+    double farthest_px = 0;  // the least of 1e-3, 1e-2, 0.1 and 1 pixels within which every wrong ray's answer changes
+    uint64_t not_finite = 0; // NaN, or an infinity other than a miss's depth
+    uint64_t open = 0;       // rays of which the reference itself is not sure
+    double depth_px = 0;     // largest |dt| in footprints, of rays that are not wrong
+    double normal_deg = 0;   // likewise
+    uint64_t uncertified = 0, certified_wrong = 0;
+    double leaf_visits = 0, newton_steps = 0; // a ray
+
+    double per_million(uint64_t count) const { return 1e6 * double(count) / double(std::max<uint64_t>(rays, 1)); }
+};
+
+inline std::ostream& operator<<(std::ostream& out, const Score& s)
+{
+    return out << s.tracer << ": " << s.rays << " rays, " << s.hits
+               << " hits; a million: " << s.per_million(s.false_misses) << " false misses, "
+               << s.per_million(s.false_hits) << " false hits, " << s.per_million(s.wrong_faces) << " wrong faces, "
+               << s.per_million(s.tangent) << " tangent, all within " << s.farthest_px << " px; |dt| " << s.depth_px
+               << " px, normals " << s.normal_deg << " deg, " << s.not_finite << " not finite; " << s.uncertified
+               << " uncertified, " << s.certified_wrong << " certified and wrong; a ray: " << s.leaf_visits
+               << " leaves, " << s.newton_steps << " steps";
+}
+
+/// Which picture, and in how many pixels.
+struct View {
+    Camera camera;
+    uint32_t width = 192, height = 144;
+};
+
+/// Pictures of every view, in exact trims. `smaller` divides their sides.
+inline Score score(Tracer& tracer, const ClosestReference& closest, const std::vector<View>& views, uint32_t smaller)
+{
+    Score s;
+    for (const View& view : views) {
+        RenderOptions options;
+        options.width = view.width / smaller;
+        options.height = view.height / smaller;
+        options.camera = view.camera;
+        options.trim = TrimMode::Exact;
+        options.shade = false;
+        RenderStats stats;
+        const Result<Frame> frame = tracer.render(options, stats);
+        if (!frame.ok()) {
+            ADD_FAILURE() << frame.error().where << ": " << frame.error().detail;
+            continue;
+        }
+        const AgainstReference a = compare_with_reference(*frame, options.camera, closest);
+        s.rays += a.rays;
+        s.hits += a.both_hit;
+        for (const FaultyPixel& pixel : a.pixels) {
+            const bool of_face = pixel.fault == Fault::WrongFace;
+            const bool decided_by_a_hair = of_face ? pixel.doubt != Doubt::None : pixel.doubt == Doubt::Tangent;
+            const bool behind = pixel.fault == Fault::FalseMiss || pixel.tracer_mm > pixel.reference_mm;
+            ++(decided_by_a_hair ? s.tangent : of_face ? s.wrong_faces : behind ? s.false_misses : s.false_hits);
+            s.farthest_px = std::max(s.farthest_px, pixel.hair_px);
+        }
+        s.not_finite += a.not_finite;
+        s.open += a.open;
+        s.depth_px = std::max(s.depth_px, a.largest_depth_px);
+        s.normal_deg = std::max(s.normal_deg, a.largest_normal_deg);
+        s.uncertified += a.uncertified;
+        s.certified_wrong += a.certified_wrong;
+        s.leaf_visits += double(stats.work.leaf_visits);
+        s.newton_steps += double(stats.work.newton_steps);
+    }
+    s.leaf_visits /= double(std::max<uint64_t>(s.rays, 1));
+    s.newton_steps /= double(std::max<uint64_t>(s.rays, 1));
+    return s;
+}
+
+/// Hands over the score of each tracer and prints it; expects no NaN and no open search. Vulkan, whose driver may be
+/// software, makes pictures with sides a quarter as long; without a driver it is named as skipped.
+inline void on_both_tracers(const std::shared_ptr<const Scene>& scene, const std::vector<View>& views,
+                            const std::function<void(const Score&)>& check)
+{
+    keep_vulkan_loaded();
+    const ClosestReference closest(scene->pack.image);
+    for (const bool vulkan : {false, true}) {
+        auto tracer = vulkan ? make_vulkan_tracer(scene, true, false) : make_cpu_tracer(scene);
+        if (!tracer.ok() && vulkan && tracer.error().code == ErrorCode::NoDevice) {
+            std::cout << "skipped vulkan: " << tracer.error().detail << "\n";
+            continue;
+        }
+        if (!tracer.ok()) {
+            ADD_FAILURE() << tracer.error().where << ": " << tracer.error().detail;
+            continue;
+        }
+        Score s = score(**tracer, closest, views, vulkan ? 4 : 1);
+        s.tracer = vulkan ? "vulkan" : "cpu";
+        std::cout << s << "\n";
+        EXPECT_EQ(s.not_finite, 0u) << s;
+        EXPECT_EQ(s.open, 0u) << s;
+        check(s);
+    }
+}
+
+} // namespace trimray::hard
