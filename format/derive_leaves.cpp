@@ -26,6 +26,9 @@ constexpr double kShortestForAspect = 0.1;
 // a tenth of the leaves, the same share of wrong pixels (1e-5), faster.
 constexpr double kSmallLeaf = 0.05;
 constexpr double kMostTurning = 4;
+// Along a straight leaf with weights w, Newton's error e becomes e^2 w' / w at the root. From the middle of a leaf
+// whose weights differ by the ratio r it thus becomes at most e (r - 1) / 2: it does not grow below r = 3.
+constexpr double kMostWeightRatio = 2;
 
 struct UvCell {
     int level[2] = {0, 0}; // splits in u and v
@@ -179,6 +182,7 @@ Net halve(Net& net, int direction)
 struct Shape {
     double turning[2] = {0, 0}; // rad
     double length[2] = {0, 0};  // patch units, mean of the polygons
+    double weights[2] = {1, 1}; // largest over smallest along a line of the net
 };
 
 double angle(const Point3& a, const Point3& b)
@@ -225,7 +229,13 @@ Shape measure(const Net& net, const std::vector<Point3>& p)
         double total = 0;
         for (int line = 0; line < lines; ++line) {
             const Point3* at = &p[size_t(line) * next_line];
-            double length = 0, turning = 0;
+            double length = 0, turning = 0, lightest = net.points[size_t(line) * next_line][3], heaviest = lightest;
+            for (int i = 1; i < count; ++i) {
+                const double w = net.points[size_t(line) * next_line + size_t(i) * step][3];
+                lightest = std::min(lightest, w);
+                heaviest = std::max(heaviest, w);
+            }
+            shape.weights[direction] = std::max(shape.weights[direction], heaviest / lightest);
             for (int i = 0; i + 1 < count; ++i) {
                 const Point3 e = minus(at[(i + 1) * step], at[i * step]);
                 length += std::sqrt(dot3(e, e));
@@ -292,10 +302,10 @@ void box_net(const Net& net, const std::vector<Point3>& p, LeafRecord& leaf)
 
 /// A piece of a patch waiting to be split or kept.
 struct Piece {
-    double excess = 0; // worst of its measures over their limits; kept when <= 1
-    int direction = 0; // to split
-    bool turns = false;
-    uint order = 0; // of creation, to break ties
+    double excess = 0;  // worst of its measures over their limits; kept when <= 1
+    int direction = 0;  // to split
+    bool turns = false; // or its weights differ: Newton may fail
+    uint order = 0;     // of creation, to break ties
     UvCell cell;
     Net net;
 };
@@ -318,8 +328,9 @@ void judge(Piece& piece, double scale, const LeafOptions& options, std::vector<P
         const double ease = std::clamp(std::sqrt(kSmallLeaf / length), 1.0, kMostTurning);
         const double turning = s.turning[i] / (options.max_turning_rad * ease);
         const double aspect = length > kShortestForAspect ? s.length[i] / (options.max_aspect * s.length[1 - i]) : 0;
-        piece.turns = piece.turns || turning > 1;
-        excess[i] = piece.cell.level[i] < kDeepestSplit ? std::max(turning, aspect) : 0;
+        const double weights = std::log2(s.weights[i]) / std::log2(kMostWeightRatio);
+        piece.turns = piece.turns || turning > 1 || weights > 1;
+        excess[i] = piece.cell.level[i] < kDeepestSplit ? std::max({turning, aspect, weights}) : 0;
     }
     piece.direction = excess[1] > excess[0] ? 1 : 0;
     piece.excess = excess[piece.direction];
