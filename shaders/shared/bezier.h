@@ -109,23 +109,26 @@ FN SurfacePoint bezier_point(FETCH_PARAM uint first, int degree_u, int degree_v,
     }
     PRECISE real u = uv.x;
     PRECISE real v = uv.y;
-    PRECISE real3 lo_u = a.p00 + (a.p01 - a.p00) * v; // S(u, v) = lo_u + u (hi_u - lo_u)
-    PRECISE real3 hi_u = a.p10 + (a.p11 - a.p10) * v;
-    PRECISE real3 lo_v = a.p00 + (a.p10 - a.p00) * u;
-    PRECISE real3 hi_v = a.p01 + (a.p11 - a.p01) * u;
+    // Sums of products again, not a + (b - a) u: beside a heavy point that loses the digits of a light one.
+    PRECISE real not_u = 1.0f - u;
+    PRECISE real not_v = 1.0f - v;
+    PRECISE real3 lo_u = a.p00 * not_v + a.p01 * v; // S(u, v) = (1 - u) lo_u + u hi_u
+    PRECISE real3 hi_u = a.p10 * not_v + a.p11 * v;
+    PRECISE real3 lo_v = a.p00 * not_u + a.p10 * u;
+    PRECISE real3 hi_v = a.p01 * not_u + a.p11 * u;
     scalar n = scalar(degree_u);
     scalar m = scalar(degree_v);
     SurfacePoint s;
-    s.p = lo_u + (hi_u - lo_u) * u;
+    s.p = lo_u * not_u + hi_u * u;
     s.du = (hi_u - lo_u) * n;
     s.dv = (hi_v - lo_v) * m;
     if (rational) {
         // S = A / w:  S_u = (A_u - w_u S) / w  (Piegl & Tiller eq. 4.8)
-        PRECISE real lo_u_w = a.w00 + (a.w01 - a.w00) * v;
-        PRECISE real hi_u_w = a.w10 + (a.w11 - a.w10) * v;
-        PRECISE real lo_v_w = a.w00 + (a.w10 - a.w00) * u;
-        PRECISE real hi_v_w = a.w01 + (a.w11 - a.w01) * u;
-        PRECISE real w = lo_u_w + (hi_u_w - lo_u_w) * u;
+        PRECISE real lo_u_w = a.w00 * not_v + a.w01 * v;
+        PRECISE real hi_u_w = a.w10 * not_v + a.w11 * v;
+        PRECISE real lo_v_w = a.w00 * not_u + a.w10 * u;
+        PRECISE real hi_v_w = a.w01 * not_u + a.w11 * u;
+        PRECISE real w = lo_u_w * not_u + hi_u_w * u;
         // outside of [0,1]^2 the sum of weights may vanish; no root is accepted there
         PRECISE real per_w = 1.0f / select(abs(w) > 1e-20f, w, real(1e-20f));
         s.p = s.p * per_w;
