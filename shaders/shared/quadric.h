@@ -94,7 +94,13 @@ FN RootPair cone_roots(scalar r, scalar tan_a, real3 origin, real3 direction)
     PRECISE real a = direction.x * direction.x + direction.y * direction.y - rho_t * rho_t;
     PRECISE real b = origin.x * direction.x + origin.y * direction.y - rho * rho_t;
     PRECISE real c = origin.x * origin.x + origin.y * origin.y - rho * rho;
-    PRECISE real discriminant = b * b - a * c;
+    // b^2 - a c without its cancellation, which blots out the apex: with m = (x, y, rho) x (x, y, rho)_t it is
+    // m_x^2 + m_y^2 - m_rho^2, and m is as small as the line is near the apex
+    PRECISE real m_x = origin.y * rho_t - rho * direction.y;
+    PRECISE real m_y = rho * direction.x - origin.x * rho_t;
+    PRECISE real m_rho = abs(origin.x * direction.y - origin.y * direction.x);
+    PRECISE real m = sqrt(m_x * m_x + m_y * m_y);
+    PRECISE real discriminant = (m - m_rho) * (m + m_rho);
     PRECISE real root = sqrt(max(discriminant, real(0.0f)));
     // q keeps the larger of the two sums; its partner is c / q
     PRECISE real q = -(b + select(b < 0.0f, -root, root));
