@@ -1,5 +1,6 @@
 // Patches -> leaves: native surfaces by the turn of their arcs, Bezier patches by the turning of their control polygon
 // and their aspect, worst first, until all are good or the patch's budget is spent.
+#include "format/bezier_net.h"
 #include "format/derive.h"
 #include "format/leaf_geometry.h"
 
@@ -133,51 +134,6 @@ void add_native_leaves(const PatchRecord& patch, uint patch_id, std::vector<Leaf
 }
 
 // ---- Bezier patches ------------------------------------------------------------------------------------------------
-
-using Point4 = std::array<double, 4>;
-
-/// A homogeneous control net, index i * count_v + j.
-struct Net {
-    int count_u = 0, count_v = 0;
-    std::vector<Point4> points;
-};
-
-Net load_net(const PackImage& image, const PatchRecord& patch)
-{
-    Net net;
-    net.count_u = int(patch.shape >> 8 & 0xffu) + 1;
-    net.count_v = int(patch.shape >> 16 & 0xffu) + 1;
-    const bool rational = (patch.shape & kShapeRational) != 0;
-    const float* from = &image.control_points[patch.first_control_point];
-    net.points.resize(size_t(net.count_u) * net.count_v);
-    for (Point4& p : net.points) {
-        p = {from[0], from[1], from[2], rational ? from[3] : 1.0};
-        from += rational ? 4 : 3;
-    }
-    return net;
-}
-
-/// Halves a net at the middle of one direction (de Casteljau, Piegl & Tiller A1.5): `net` becomes the lower half, the
-/// upper half is returned.
-Net halve(Net& net, int direction)
-{
-    Net upper = net;
-    const int count = direction == 0 ? net.count_u : net.count_v;
-    const int lines = direction == 0 ? net.count_v : net.count_u;
-    const int step = direction == 0 ? net.count_v : 1, next_line = direction == 0 ? 1 : net.count_v;
-    for (int line = 0; line < lines; ++line) {
-        Point4* lo = &net.points[size_t(line) * next_line];
-        Point4* hi = &upper.points[size_t(line) * next_line];
-        // hi runs the triangle in place; its first point at each level is lo's next one
-        for (int level = 1; level < count; ++level) {
-            for (int i = 0; i < count - level; ++i)
-                for (int c = 0; c < 4; ++c)
-                    hi[i * step][c] = 0.5 * (hi[i * step][c] + hi[(i + 1) * step][c]);
-            lo[level * step] = hi[0];
-        }
-    }
-    return upper;
-}
 
 struct Shape {
     double turning[2] = {0, 0}; // rad
