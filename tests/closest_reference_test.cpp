@@ -491,19 +491,6 @@ TEST(ClosestReference, ADoubtfulRayIsOneWithinAThousandthOfAPixelOfARim)
     }
 }
 
-/// Two round discs of 20 mm, 4 mm apart, their outsides above and below, with rims as `flags` says.
-std::shared_ptr<const Scene> slab(uint flags)
-{
-    TracedScene scene;
-    scene.add(kKindPlane, 1, {0, 0, 0.2}, {1, 1});
-    scene.add(kKindPlane, 1, {0, 0, -0.2}, {1, 1});
-    for (const size_t face : {0u, 1u}) {
-        scene.trim(face, {shapes::circle(0.5, 0.5, 0.47, 0.47)});
-        scene.image.faces[face].flags |= flags | (face == 1 ? kFaceReversed : 0);
-    }
-    return scene.finish();
-}
-
 TEST(ClosestReference, RimsAreASurfaceFromWithinAndShowNoBacksFromOutside)
 {
     const auto with = slab(4u << kFaceRimBit | 5u << (kFaceRimBit + kFaceRimBits)), without = slab(0);

@@ -53,19 +53,6 @@ TEST(rim, is_no_surface_for_a_ray_from_outside_that_meets_its_back)
         expect_pictures(without_rim(flagged(plane, kRims | kFaceReversed)));
 }
 
-/// Two trimmed planes, their outsides above and below: 20 mm a side, 4 mm apart.
-std::shared_ptr<const Scene> slab(uint flags)
-{
-    TracedScene builder;
-    builder.add(kKindPlane, 1, {0, 0, 0.2}, {1, 1});
-    builder.add(kKindPlane, 1, {0, 0, -0.2}, {1, 1});
-    for (const size_t face : {0u, 1u}) {
-        builder.trim(face, {shapes::circle(0.5, 0.5, 0.47, 0.47)});
-        builder.image.faces[face].flags |= flags | (face == 1 ? kFaceReversed : 0);
-    }
-    return builder.finish();
-}
-
 TEST(rim, is_seen_from_within_the_shell_up_to_its_border)
 {
     keep_vulkan_loaded();

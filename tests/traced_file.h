@@ -33,13 +33,9 @@ struct TemporaryFile {
     TemporaryFile& operator=(const TemporaryFile&) = delete;
 };
 
-/// Null where some step fails, which fails the test. A face that is dropped does too.
-inline std::shared_ptr<const Scene> scene_of_model(const CadModel& model)
+/// As a pack's bytes say. Null where they cannot be read, which fails the test.
+inline std::shared_ptr<const Scene> scene_of_image(const PackImage& image)
 {
-    BuildReport report;
-    const PackImage image = build_pack(model, {}, report);
-    for (const DroppedFace& face : image.dropped)
-        ADD_FAILURE() << "face " << face.face_in_part << ": " << image.strings.strings[face.reason];
     Result<LoadedPack> pack = decode_pack(encode_pack(image, {}), {});
     if (!pack.ok()) {
         ADD_FAILURE() << pack.error().where << ": " << pack.error().detail;
@@ -48,6 +44,16 @@ inline std::shared_ptr<const Scene> scene_of_model(const CadModel& model)
     auto scene = std::make_shared<Scene>();
     scene->pack = std::move(pack).value();
     return scene;
+}
+
+/// Null where some step fails, which fails the test. A face that is dropped does too.
+inline std::shared_ptr<const Scene> scene_of_model(const CadModel& model)
+{
+    BuildReport report;
+    const PackImage image = build_pack(model, {}, report);
+    for (const DroppedFace& face : image.dropped)
+        ADD_FAILURE() << "face " << face.face_in_part << ": " << image.strings.strings[face.reason];
+    return scene_of_image(image);
 }
 
 inline std::shared_ptr<const Scene> scene_of_file(const std::string& path)

@@ -135,6 +135,20 @@ struct TracedScene {
     }
 };
 
+/// Two round discs of 20 mm, 4 mm apart, their outsides above and below: a shell without its wall, with rims as `flags`
+/// (FaceRecord) says.
+inline std::shared_ptr<const Scene> slab(uint flags)
+{
+    TracedScene scene;
+    scene.add(kKindPlane, 1, {0, 0, 0.2}, {1, 1});
+    scene.add(kKindPlane, 1, {0, 0, -0.2}, {1, 1});
+    for (const size_t face : {0u, 1u}) {
+        scene.trim(face, {shapes::circle(0.5, 0.5, 0.47, 0.47)});
+        scene.image.faces[face].flags |= flags | (face == 1 ? kFaceReversed : 0);
+    }
+    return scene.finish();
+}
+
 struct Drawn {
     Frame frame;
     RenderStats stats;

@@ -1,6 +1,4 @@
 // Gaps between neighbouring faces: none shows the inside of a closed solid.
-#include "format/pack_reader.h"
-#include "format/pack_writer.h"
 #include "preprocess/bezier_patch.h"
 #include "preprocess/build_pack.h"
 #include "preprocess/cad_import.h"
@@ -8,6 +6,7 @@
 #include "tests/hard/leaks.h"
 #include "tests/keep_vulkan_loaded.h"
 #include "tests/occt_solids.h"
+#include "tests/traced_file.h"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -56,14 +55,7 @@ std::shared_ptr<const Scene> scene_of(const CadModel& model, bool grow)
         const bool closed_and_grown = kind != TrimFindingKind::OpenLoop && kind != TrimFindingKind::NotGrown;
         EXPECT_TRUE(closed_and_grown) << "face " << found.face_in_part << ": " << finding_detail(found.finding);
     }
-    Result<LoadedPack> pack = decode_pack(encode_pack(image, {}), {});
-    if (!pack.ok()) {
-        ADD_FAILURE() << pack.error().where << ": " << pack.error().detail;
-        return nullptr;
-    }
-    auto scene = std::make_shared<Scene>();
-    scene->pack = std::move(pack).value();
-    return scene;
+    return scene_of_image(image);
 }
 
 /// Counts in pictures of all `views`, from outside and from within.
