@@ -24,14 +24,23 @@
 #include <Geom_BSplineCurve.hxx>
 #include <Geom_BSplineSurface.hxx>
 #include <Geom_BezierCurve.hxx>
+#include <Geom_BezierSurface.hxx>
+#include <Geom_Circle.hxx>
 #include <Geom_ConicalSurface.hxx>
 #include <Geom_CylindricalSurface.hxx>
 #include <Geom_Ellipse.hxx>
+#include <Geom_Hyperbola.hxx>
+#include <Geom_Line.hxx>
+#include <Geom_OffsetCurve.hxx>
 #include <Geom_OffsetSurface.hxx>
+#include <Geom_Parabola.hxx>
 #include <Geom_Plane.hxx>
 #include <Geom_RectangularTrimmedSurface.hxx>
+#include <Geom_SphericalSurface.hxx>
 #include <Geom_SurfaceOfLinearExtrusion.hxx>
 #include <Geom_SurfaceOfRevolution.hxx>
+#include <Geom_ToroidalSurface.hxx>
+#include <Geom_TrimmedCurve.hxx>
 #include <IGESControl_Writer.hxx>
 #include <Precision.hxx>
 #include <STEPControl_Reader.hxx>
@@ -51,6 +60,7 @@
 #include <gp_Trsf.hxx>
 
 #include <cmath>
+#include <utility>
 
 namespace trimray::oracle {
 
@@ -152,7 +162,127 @@ gp_Trsf mirrored_in_x()
     return mirror;
 }
 
+/// A piece of a surface.
+struct Piece {
+    KindOfFace kind;
+    Handle(Geom_Surface) surface;
+    double u0, u1, v0, v1;
+};
+
+/// The surface within its own bounds.
+Piece whole(const KindOfFace& kind, const Handle(Geom_Surface) & surface)
+{
+    Piece piece{kind, surface, 0, 0, 0, 0};
+    surface->Bounds(piece.u0, piece.u1, piece.v0, piece.v1);
+    return piece;
+}
+
+Handle(Geom_BSplineSurface) wavy_sheet()
+{
+    TColgp_Array2OfPnt points(1, 6, 1, 6);
+    for (int i = 1; i <= 6; ++i)
+        for (int j = 1; j <= 6; ++j)
+            points(i, j) = gp_Pnt(3.0 * i - 10, 3.0 * j - 10, 2 * std::sin(0.9 * i) * std::cos(0.7 * j));
+    return GeomAPI_PointsToBSplineSurface(points, 3, 5).Surface();
+}
+
+Handle(Geom_BezierSurface) bezier_sheet()
+{
+    TColgp_Array2OfPnt points(1, 4, 1, 3);
+    for (int i = 1; i <= 4; ++i)
+        for (int j = 1; j <= 3; ++j)
+            points(i, j) = gp_Pnt(5.0 * i - 12, 7.0 * j - 14, (i * j) % 3 * 3.0);
+    return new Geom_BezierSurface(points);
+}
+
+/// Curves in the plane y = 0, about 10 mm from the z axis and as long; revolved about z or extruded along y.
+std::vector<std::pair<const char*, Handle(Geom_Curve)>> profile_curves()
+{
+    const gp_Ax2 middle(gp_Pnt(8, 0, 0), gp_Dir(0, -1, 0), gp_Dir(1, 0, 0));
+    const auto piece = [](const Handle(Geom_Curve) & curve, double from, double to) {
+        return Handle(Geom_Curve)(new Geom_TrimmedCurve(curve, from, to));
+    };
+    TColgp_Array1OfPnt points(1, 4);
+    points(1) = gp_Pnt(6, 0, -6);
+    points(2) = gp_Pnt(12, 0, -2);
+    points(3) = gp_Pnt(4, 0, 2);
+    points(4) = gp_Pnt(9, 0, 6);
+    const Handle(Geom_BSplineCurve) spline = GeomAPI_PointsToBSpline(points, 3, 5).Curve();
+    return {{"a line", piece(new Geom_Line(gp_Pnt(7, 0, 0), gp_Dir(0.4, 0, 1)), -6, 6)},
+            {"a circle", piece(new Geom_Circle(middle, 5), 0.5, 3)},
+            {"an ellipse", piece(new Geom_Ellipse(middle, 5, 3), 0.5, 3)},
+            {"a parabola", piece(new Geom_Parabola(middle, 2), -5, 5)},
+            {"a hyperbola", piece(new Geom_Hyperbola(middle, 2, 3), -1, 1)},
+            {"a Bezier curve", new Geom_BezierCurve(points)},
+            {"a spline", spline},
+            {"an offset curve", new Geom_OffsetCurve(spline, 1, gp_Dir(0, 1, 0))}};
+}
+
+std::vector<Piece> pieces_of_every_kind()
+{
+    const gp_Ax3 axes(gp_Pnt(), gp_Dir(0, 0, 1));
+    const Handle(Geom_Surface) plane = new Geom_Plane(axes), cylinder = new Geom_CylindricalSurface(axes, 7),
+                               cone = new Geom_ConicalSurface(axes, 0.4, 5),
+                               sphere = new Geom_SphericalSurface(axes, 8),
+                               torus = new Geom_ToroidalSurface(axes, 8, 3), sheet = wavy_sheet();
+    std::vector<Piece> pieces{
+        {{"plane", "plane"}, plane, -8, 8, -8, 8},
+        {{"cylinder", "cylinder"}, cylinder, 0.5, 4, -8, 8},
+        {{"cone", "cone"}, cone, 0.5, 4, -8, 8},
+        {{"sphere", "sphere"}, sphere, 0.5, 4, -1, 1.2},
+        {{"torus", "torus"}, torus, 0.5, 4, 1, 5},
+        whole({"Bezier surface", "bezier"}, bezier_sheet()),
+        whole({"spline surface", "bspline"}, sheet),
+        whole({"trimmed cylinder", "cylinder"}, new Geom_RectangularTrimmedSurface(cylinder, 1.0, 3.0, -5.0, 5.0)),
+        {{"offset of a plane", "offset"}, new Geom_OffsetSurface(plane, 4), -8, 8, -8, 8},
+        {{"offset of a cylinder", "offset"}, new Geom_OffsetSurface(cylinder, 2), 0.5, 4, -8, 8},
+        {{"offset of a cone", "offset"}, new Geom_OffsetSurface(cone, 2), 0.5, 4, -8, 8},
+        {{"offset of a torus", "offset"}, new Geom_OffsetSurface(torus, 1), 0.5, 4, 1, 5},
+        whole({"offset of a spline surface", "offset"}, new Geom_OffsetSurface(sheet, 2)),
+        whole({"offset of an offset", "offset"}, new Geom_OffsetSurface(new Geom_OffsetSurface(sheet, 2), -1)),
+    };
+    for (const auto& [name, curve] : profile_curves()) {
+        const double first = curve->FirstParameter(), last = curve->LastParameter();
+        const Handle(Geom_Surface) extruded = new Geom_SurfaceOfLinearExtrusion(curve, gp_Dir(0.3, 1, 0.2)),
+                                   revolved = new Geom_SurfaceOfRevolution(curve, gp_Ax1(gp_Pnt(), gp_Dir(0, 0, 1)));
+        pieces.push_back({{name, "extrusion"}, extruded, first, last, -8, 8});
+        pieces.push_back({{name, "revolution"}, revolved, 0.5, 3, first, last});
+        pieces.push_back({{name, "offset"}, new Geom_OffsetSurface(extruded, 1), first, last, -8, 8});
+        pieces.push_back({{name, "offset"}, new Geom_OffsetSurface(revolved, 1), 0.5, 3, first, last});
+    }
+    return pieces;
+}
+
 } // namespace
+
+std::vector<KindOfFace> kinds_of_faces()
+{
+    std::vector<KindOfFace> kinds;
+    for (const Piece& piece : pieces_of_every_kind())
+        kinds.push_back(piece.kind);
+    return kinds;
+}
+
+bool write_every_kind(const std::string& path)
+{
+    try {
+        BRep_Builder builder;
+        TopoDS_Compound all;
+        builder.MakeCompound(all);
+        int place = 0;
+        for (const Piece& piece : pieces_of_every_kind()) {
+            gp_Trsf there;
+            there.SetTranslation(gp_Vec(place % kKindsPerRow, place / kKindsPerRow, 0) * kKindStep_mm);
+            ++place;
+            const TopoDS_Shape face =
+                BRepBuilderAPI_MakeFace(piece.surface, piece.u0, piece.u1, piece.v0, piece.v1, kFaceTolerance).Shape();
+            builder.Add(all, BRepBuilderAPI_Transform(face, there, true).Shape());
+        }
+        return write_shape(all, path);
+    } catch (const Standard_Failure&) {
+        return false;
+    }
+}
 
 bool write_swept_model(const std::string& path)
 {

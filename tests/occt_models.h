@@ -3,12 +3,26 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 namespace trimray::oracle {
 
 /// Extrusion of a spline, revolution of a spline, offset of a spline surface, each trimmed by a hole. False: not
 /// written.
 bool write_swept_model(const std::string& path);
+
+/// One face of every kind of surface that a BREP file can hold, with the kind its report should say; faces stand 30 mm
+/// apart, kKindsPerRow in a row along x, rows along y, each within 14 mm of its place.
+inline constexpr int kKindsPerRow = 8;
+inline constexpr double kKindStep_mm = 30;
+struct KindOfFace {
+    const char* name; // of the surface, or of the curve that is swept, and offset where that is the kind
+    const char* source_kind;
+};
+std::vector<KindOfFace> kinds_of_faces();
+
+/// False: not written.
+bool write_every_kind(const std::string& path);
 
 /// A frustum so flat that its two nappes lie within single precision of each other. False: not written.
 bool write_flat_cone(const std::string& path);

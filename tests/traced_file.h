@@ -110,7 +110,7 @@ inline Frame right_picture(const std::shared_ptr<const Scene>& scene, const Rend
                              "degrees\n",
                              name, vulkan ? "vulkan" : "cpu", found.both_hit, found.rays, sum(found.faults),
                              sum(found.doubtful), found.largest_depth_px, found.largest_normal_deg);
-    EXPECT_GT(found.both_hit, found.rays / 20) << name << ": the view shows nothing";
+    EXPECT_GT(found.both_hit, found.rays / 30) << name << ": the view shows nothing";
     uint64_t beside = 0;
     for (const FaultyPixel& p : found.pixels) {
         beside += p.fault == Fault::FalseHit && p.doubt != Doubt::Tangent && p.hair_px <= 0.01;
