@@ -9,6 +9,8 @@
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <fmt/format.h>
+#include <iterator>
 #include <limits>
 #include <span>
 
@@ -191,16 +193,23 @@ FaceRecord face_record(const ConvertedFace& face, StringTable& strings)
     return r;
 }
 
-/// Gives the faces of a part's closed shells their rims. Domain: converted faces.
-void find_rims(const CadPart& part, std::span<ConvertedFace> faces)
+/// Gives the faces of a part's closed shells their rims. Domain: converted faces. Returns what is wrong with the part's
+/// orientation, in words; empty: nothing.
+std::string find_rims(const CadPart& part, std::span<ConvertedFace> faces)
 {
     std::vector<ShellFace> shell;
     for (const ConvertedFace& face : faces)
         shell.push_back({face.cad, face.dropped_reason.empty() ? &face.trims : nullptr});
-    const std::vector<uint8_t> closed = in_closed_shells(shell, part.edges.size());
+    const ClosedShells closed = find_closed_shells(shell, part.edges.size());
     for (size_t f = 0; f < faces.size(); ++f)
-        if (closed[f])
+        if (closed.in_one[f])
             faces[f].rims = rim_flags(faces[f].cad->surface, faces[f].trims);
+    if (closed.inside_out)
+        return fmt::format("part \"{}\" is inside out: its faces point inwards", part.name);
+    if (closed.disputed_edges > 0)
+        return fmt::format("part \"{}\": at {} edges one face points inwards and its neighbour outwards", part.name,
+                           closed.disputed_edges);
+    return {};
 }
 
 void append_face(const ConvertedFace& face, PackImage& image)
@@ -296,9 +305,11 @@ void run(const CadModel& model, const BuildOptions& options, PackImage& image, B
         if (face.dropped_reason.empty())
             convert_surface(face, frames[face.part], options.trims);
     });
+    std::vector<std::string> orientation_warnings(model.parts.size());
     tbb::parallel_for(size_t{0}, model.parts.size(), [&](size_t part) {
         const size_t first = first_of_part[part];
-        find_rims(model.parts[part], std::span(faces).subspan(first, first_of_part[part + 1] - first));
+        orientation_warnings[part] =
+            find_rims(model.parts[part], std::span(faces).subspan(first, first_of_part[part + 1] - first));
     });
     std::vector<std::vector<uint>> face_ids(model.parts.size());
     for (size_t part = 0; part < model.parts.size(); ++part) {
@@ -343,6 +354,8 @@ void run(const CadModel& model, const BuildOptions& options, PackImage& image, B
     report.converted = static_cast<uint32_t>(image.faces.size());
     report.faces = report.converted + static_cast<uint32_t>(image.dropped.size());
     report.warnings = model.warnings;
+    std::copy_if(orientation_warnings.begin(), orientation_warnings.end(), std::back_inserter(report.warnings),
+                 [](const std::string& warning) { return !warning.empty(); });
 
     start = Clock::now();
     if (!options.compact) // coarse triangles follow from the rest, and no thumbnail needs them

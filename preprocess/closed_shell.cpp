@@ -96,7 +96,7 @@ struct EdgeWalks {
 
 } // namespace
 
-std::vector<uint8_t> in_closed_shells(const std::vector<ShellFace>& faces, size_t edge_count)
+ClosedShells find_closed_shells(const std::vector<ShellFace>& faces, size_t edge_count)
 {
     std::vector<EdgeWalks> edges(edge_count);
     Sets sets(faces.size());
@@ -128,11 +128,18 @@ std::vector<uint8_t> in_closed_shells(const std::vector<ShellFace>& faces, size_
     for (size_t f = 0; f < faces.size(); ++f)
         if (has_edges[f] && closed[sets.first_of(f)])
             moments[sets.first_of(f)].add(moments_of(*faces[f].cad, *faces[f].trims));
-    std::vector<uint8_t> found(faces.size());
+    ClosedShells found;
+    found.in_one.resize(faces.size());
+    double volume3 = 0;
     for (size_t f = 0; f < faces.size(); ++f) {
         const size_t first = sets.first_of(f);
-        found[f] = has_edges[f] && closed[first] && moments[first].volume3() > 0;
+        const bool closes = has_edges[f] && closed[first];
+        found.in_one[f] = closes && moments[first].volume3() > 0;
+        volume3 += closes && first == f ? moments[f].volume3() : 0; // of a void it is negative, and its solid's larger
     }
+    found.inside_out = volume3 < 0;
+    for (const EdgeWalks& walks : edges)
+        found.disputed_edges += walks.forward + walks.backward == 2 && walks.forward != 1;
     return found;
 }
 

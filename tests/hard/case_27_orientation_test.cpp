@@ -2,6 +2,8 @@
 #include "tests/occt_solids.h"
 #include "tests/traced_file.h"
 
+#include <gmock/gmock.h>
+
 #include <array>
 #include <tuple>
 
@@ -10,11 +12,15 @@ namespace {
 
 using oracle::Flip;
 
-std::shared_ptr<const Scene> scene_of(oracle::Solid solid, Flip flip)
+CadModel model_of(oracle::Solid solid, Flip flip)
 {
     const TemporaryFile file("flipped.brep");
     EXPECT_TRUE(oracle::write_flipped(solid, flip, file.path));
-    return scene_of_file(file.path);
+    ImportOptions options;
+    options.proxy_deflection = 0;
+    Result<CadModel> model = import_cad(file.path, options, {});
+    EXPECT_TRUE(model.ok());
+    return model.ok() ? std::move(*model) : CadModel{};
 }
 
 /// The frame with the normals of faces turned that are not oriented as in `other`.
@@ -35,7 +41,7 @@ class Orientation27 : public testing::TestWithParam<oracle::Solid> {};
 
 TEST_P(Orientation27, AFlippedSolidLooksTheSame)
 {
-    const auto plain = scene_of(GetParam(), Flip::None);
+    const auto plain = scene_of_model(model_of(GetParam(), Flip::None));
     ASSERT_TRUE(plain);
     const PackImage& image = plain->pack.image;
     RenderOptions options;
@@ -45,7 +51,7 @@ TEST_P(Orientation27, AFlippedSolidLooksTheSame)
                                              {Flip::OneFace, "one face", size_t(1)},
                                              {Flip::Faces, "all faces", image.faces.size()},
                                              {Flip::Solid, "the solid", image.faces.size()}}) {
-        const auto scene = scene_of(GetParam(), flip);
+        const auto scene = scene_of_model(model_of(GetParam(), flip));
         ASSERT_TRUE(scene) << name;
         const PackImage& flipped = scene->pack.image;
         ASSERT_EQ(flipped.faces.size(), image.faces.size()) << name;
@@ -62,6 +68,20 @@ TEST_P(Orientation27, AFlippedSolidLooksTheSame)
             expect_same(frames[vulkan], frame, options, name);
         }
     }
+}
+
+TEST_P(Orientation27, WhatIsTurnedRoundIsReported)
+{
+    const auto warnings = [](Flip flip) {
+        BuildReport report;
+        build_pack(model_of(GetParam(), flip), {}, report);
+        return report.warnings;
+    };
+    using testing::ElementsAre, testing::HasSubstr;
+    EXPECT_THAT(warnings(Flip::None), testing::IsEmpty());
+    EXPECT_THAT(warnings(Flip::OneFace), ElementsAre(HasSubstr("one face points inwards and its neighbour outwards")));
+    EXPECT_THAT(warnings(Flip::Faces), ElementsAre(HasSubstr("is inside out")));
+    EXPECT_THAT(warnings(Flip::Solid), ElementsAre(HasSubstr("is inside out")));
 }
 
 INSTANTIATE_TEST_SUITE_P(case_27, Orientation27, testing::Values(oracle::Solid::Box, oracle::Solid::DrilledCylinder),
