@@ -164,14 +164,12 @@ public:
         Box whole;
         whole.net.degree[0] = patch_.degree_[0];
         whole.net.degree[1] = patch_.degree_[1];
-        double reach = 0;
         for (const Point& p : patch_.net_) {
             const Vec3 wp{p[0], p[1], p[2]};
             const Vec3 relative = wp - ray_.origin * p[3];
             whole.net.points.push_back({dot(n1_, relative), dot(n2_, relative), dot(along_, relative), p[3]});
-            reach = std::max(reach, length(wp) / p[3]);
         }
-        reach_ = reach + length(ray_.origin);
+        reach_ = patch_.reach_ + length(ray_.origin);
         whole.rounding = 16 * kUnit * reach_;
         whole.near = nearest(whole);
         stack_.push_back(std::move(whole));
@@ -495,14 +493,15 @@ BezierReference::BezierReference(const PatchRecord& patch, const float* control_
         keep_left(net, axis, 1 + overlap[axis]);
         keep_right(net, axis, -overlap[axis] / (1 + overlap[axis]));
     }
-    for (const Point& p : net.points)
-        if (!(p[3] > 0))
-            return;
-    net_ = std::move(net.points);
-    for (int axis = 0; axis < 2; ++axis) {
-        lo_[axis] = -overlap[axis];
-        size_[axis] = 1 + 2 * overlap[axis];
+    if (std::all_of(net.points.begin(), net.points.end(), [](const Point& p) { return p[3] > 0; })) {
+        net_ = std::move(net.points);
+        for (int axis = 0; axis < 2; ++axis) {
+            lo_[axis] = -overlap[axis];
+            size_[axis] = 1 + 2 * overlap[axis];
+        }
     }
+    for (const Point& p : net_)
+        reach_ = std::max(reach_, length(Vec3{p[0], p[1], p[2]}) / p[3]);
 }
 
 SearchEnd BezierReference::intersect(const Ray& ray, double t_lo, double t_hi, const TakeRoot& take) const

@@ -57,6 +57,7 @@ private:
     int degree_[2];
     double lo_[2] = {0, 0}, size_[2] = {1, 1}; // uv_patch = lo + size * s, s in [0, 1]^2 the net's own parameters
     std::vector<Point> net_;                   // (degree_u + 1) (degree_v + 1), v runs fastest
+    double reach_ = 0;                         // of the control points from the origin, patch units
 };
 
 } // namespace trimray::reference

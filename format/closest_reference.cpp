@@ -104,6 +104,8 @@ struct ClosestReference::Walk {
 ClosestReference::ClosestReference(const PackImage& image)
     : image_(image), trims_(image), beziers_(image.patches.size()), parts_(image.parts.size())
 {
+    for (const PatchRecord& patch : image.patches)
+        to_patch_.push_back(inverse(axes_of(patch)));
     for (size_t p = 0; p < image.parts.size(); ++p) {
         const PartRecord& part = image.parts[p];
         std::vector<Bounds> boxes;
@@ -190,6 +192,7 @@ void ClosestReference::accept(uint patch_id, const Root& root, double t, Walk& w
     walk.best.face = patch.face;
     walk.best.instance = walk.instance;
     walk.best.patch = patch_id;
+    walk.best.kind = kind_of(patch);
     walk.best.uv_patch = {root.u, root.v};
     walk.best.uv_face = uv;
     walk.best.contact = root.contact;
@@ -253,7 +256,7 @@ void ClosestReference::intersect_patch(uint patch_id, Walk& walk) const
     const Real base = along / length2;
     for (size_t i = 0; i < 3; ++i)
         offset[i] += base * walk.direction_part[i];
-    const Matrix back = inverse(axes_of(patch));
+    const Matrix& back = to_patch_[patch_id];
     const Real3 o = times(back, offset), d = times(back, walk.direction_part);
     Ray ray;
     for (size_t i = 0; i < 3; ++i) {
@@ -346,30 +349,34 @@ void ClosestReference::finish(ReferenceHit& hit) const
         hit.normal = reference::operator*(normal, 1 / size);
 }
 
-Doubt ClosestReference::doubt(const Ray& ray, const ReferenceHit& answer, const Vec3& step_x, const Vec3& step_y,
-                              double reach_px) const
+Hair ClosestReference::hair(const Ray& ray, const ReferenceHit& answer, const Vec3& step_x, const Vec3& step_y,
+                            double reach_px) const
 {
     constexpr int kDirections = 8;
+    constexpr double kInfinity = std::numeric_limits<double>::infinity();
     using reference::operator+;
     using reference::operator*;
     const double pixel =
         std::max(reference::length(step_x), reference::length(step_y)) / reference::length(ray.direction);
-    Doubt doubt = Doubt::None;
+    Hair hair;
     for (int i = 0; i < kDirections; ++i) {
         const double angle = 2 * std::numbers::pi * i / kDirections;
         Ray moved = ray;
         moved.direction = ray.direction + step_x * (reach_px * std::cos(angle)) + step_y * (reach_px * std::sin(angle));
         const ReferenceHit other = closest(moved);
         if (other.hit != answer.hit)
-            return Doubt::Tangent;
+            return {Doubt::Tangent, kInfinity, kInfinity};
         if (!answer.hit)
             continue;
-        if (std::abs(other.distance_mm - answer.distance_mm) > pixel * std::min(other.distance_mm, answer.distance_mm))
-            return Doubt::Tangent;
+        const double deeper = std::abs(other.distance_mm - answer.distance_mm);
+        if (deeper > pixel * std::min(other.distance_mm, answer.distance_mm))
+            return {Doubt::Tangent, kInfinity, kInfinity};
+        hair.depth_mm = std::max(hair.depth_mm, deeper);
+        hair.turn_deg = std::max(hair.turn_deg, reference::angle_deg(other.normal, answer.normal));
         if (other.face != answer.face || other.instance != answer.instance)
-            doubt = Doubt::Face;
+            hair.doubt = Doubt::Face;
     }
-    return doubt;
+    return hair;
 }
 
 } // namespace trimray

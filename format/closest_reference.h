@@ -25,7 +25,7 @@ namespace trimray {
 struct ReferenceHit {
     bool hit = false;
     double distance_mm = std::numeric_limits<double>::infinity();
-    uint face = 0, instance = 0, patch = 0;
+    uint face = 0, instance = 0, patch = 0, kind = 0; // kind: kKind... of the patch
     std::array<double, 2> uv_patch{}, uv_face{}, uv_file{};
     std::array<double, 3> normal{};  // unit, world, outward as the face's orientation says; 0 where there is none
     bool contact = false;            // the ray touches the surface there within rounding
@@ -40,6 +40,12 @@ enum class Doubt {
     Tangent, // a hit where there was none or none where there was one, or a jump in depth
 };
 
+/// What is around an answer.
+struct Hair {
+    Doubt doubt = Doubt::None;
+    double depth_mm = 0, turn_deg = 0; // the most that distance and normal change; infinite where doubt is Tangent
+};
+
 class ClosestReference {
 public:
     using Vec3 = reference::Vec3;
@@ -50,11 +56,11 @@ public:
     /// The closest hit of a ray in world mm. Domain: finite, direction not 0 (it need not be unit).
     ReferenceHit closest(const reference::Ray& ray) const;
 
-    /// Whether `answer`, which is closest(ray)'s, is one that a hair decides: the ray's direction is moved by
-    /// `reach_px` in eight directions of the picture, given the changes of direction from pixel to pixel. A jump in
-    /// depth is one of more than a pixel's size at that distance. Costs eight rays.
-    Doubt doubt(const reference::Ray& ray, const ReferenceHit& answer, const Vec3& step_x, const Vec3& step_y,
-                double reach_px = 1e-3) const;
+    /// What a hair changes of `answer`, which is closest(ray)'s: the ray's direction is moved by `reach_px` in eight
+    /// directions of the picture, given the changes of direction from pixel to pixel. A jump in depth is one of more
+    /// than a pixel's size at that distance. Costs eight rays.
+    Hair hair(const reference::Ray& ray, const ReferenceHit& answer, const Vec3& step_x, const Vec3& step_y,
+              double reach_px = 1e-3) const;
 
 private:
     struct Placement {
@@ -75,6 +81,7 @@ private:
     const PackImage& image_;
     TrimReference trims_;
     std::vector<std::optional<reference::BezierReference>> beziers_; // of each patch that is one
+    std::vector<std::array<long double, 9>> to_patch_;               // of each patch: its axes, inverted
     std::vector<reference::BoxTree> parts_;                          // over each part's patches, part units
     std::vector<Placement> placements_;
     reference::BoxTree placed_; // instances, world mm

@@ -37,6 +37,13 @@ inline double length(const Vec3& a)
     return std::hypot(a[0], a[1], a[2]);
 }
 
+/// Between two vectors, accurate at 0 and 180 too; 0 where either vanishes.
+inline double angle_deg(const Vec3& a, const Vec3& b)
+{
+    constexpr double kDegrees = 57.29577951308232;
+    return kDegrees * std::atan2(length(cross(a, b)), dot(a, b));
+}
+
 /// Points origin + t * direction; the direction has any length but 0.
 struct Ray {
     Vec3 origin{}, direction{};

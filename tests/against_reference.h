@@ -9,8 +9,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <mutex>
-#include <string>
+#include <numeric>
 #include <vector>
 
 namespace trimray {
@@ -24,6 +23,7 @@ enum class Fault {
 inline constexpr const char* kFaultNames[] = {"false miss", "false hit", "wrong depth", "wrong face"};
 inline constexpr size_t kFaultCount = 4;
 inline constexpr double kWrongDepthPx = 1; // footprints: distance times the angle of a pixel
+inline constexpr double kDepthOffPx = 0.1, kNormalOffDeg = 0.1;
 
 struct FaultyPixel {
     uint32_t x = 0, y = 0;
@@ -38,17 +38,54 @@ struct FaultyPixel {
 };
 
 struct AgainstReference {
-    uint64_t rays = 0, both_hit = 0;
-    std::array<uint64_t, kFaultCount> faults{};         // of rays that the reference is sure of
-    std::array<uint64_t, kFaultCount> doubtful{};       // of rays that a hair decides (of wrong faces: a border)
-    uint64_t certified_wrong = 0;                       // of `faults` but for wrong faces: claimed to be right
-    uint64_t uncertified = 0, uncertified_right = 0;    // pixels; and those of them that agree
-    uint64_t not_finite = 0;                            // NaN, or an infinity other than a miss's depth
-    uint64_t open = 0;                                  // pixels at which the reference gave a search up
-    double largest_depth_px = 0, mean_depth_px = 0;     // |dt| in footprints where hit and face agree
-    double largest_normal_deg = 0, mean_normal_deg = 0; // likewise
-    std::array<uint32_t, 2> normal_pixel{};             // where the largest is
-    std::vector<FaultyPixel> pixels;                    // every fault and doubtful one, row by row
+    uint64_t rays = 0, both_hit = 0, agree = 0;      // agree: both hit, in one face, kWrongDepthPx apart at most
+    std::array<uint64_t, kFaultCount> faults{};      // of rays that the reference is sure of
+    std::array<uint64_t, kFaultCount> doubtful{};    // of rays that a hair decides (of wrong faces: a border)
+    uint64_t certified_wrong = 0;                    // of `faults` but for wrong faces: claimed to be right
+    uint64_t uncertified = 0, uncertified_right = 0; // pixels; and those of them that agree
+    uint64_t not_finite = 0;                         // NaN, or an infinity other than a miss's depth
+    uint64_t open = 0;                               // pixels at which the reference gave a search up
+    // Of those that agree. Off: by more than kDepthOffPx or kNormalOffDeg, and more than a hair changes.
+    uint64_t depths_off = 0;
+    std::array<uint64_t, kSurfaceKindCount> agree_by_kind{}, normals_off{}; // by the surface's kind
+    double largest_depth_px = 0, sum_depth_px = 0;                          // |dt| in footprints
+    double largest_normal_deg = 0, sum_normal_deg = 0;
+    std::array<uint32_t, 2> normal_pixel{}; // where the largest is
+    std::vector<FaultyPixel> pixels;        // every fault and doubtful one, row by row
+
+    double mean_depth_px() const { return sum_depth_px / double(std::max<uint64_t>(agree, 1)); }
+    double mean_normal_deg() const { return sum_normal_deg / double(std::max<uint64_t>(agree, 1)); }
+    uint64_t all_normals_off() const { return std::accumulate(normals_off.begin(), normals_off.end(), uint64_t(0)); }
+
+    /// Adds other rays'; their pixels follow.
+    void add(const AgainstReference& other)
+    {
+        const auto each = [](auto& to, const auto& from) {
+            for (size_t k = 0; k < to.size(); ++k)
+                to[k] += from[k];
+        };
+        rays += other.rays;
+        both_hit += other.both_hit;
+        agree += other.agree;
+        each(faults, other.faults);
+        each(doubtful, other.doubtful);
+        certified_wrong += other.certified_wrong;
+        uncertified += other.uncertified;
+        uncertified_right += other.uncertified_right;
+        not_finite += other.not_finite;
+        open += other.open;
+        depths_off += other.depths_off;
+        each(agree_by_kind, other.agree_by_kind);
+        each(normals_off, other.normals_off);
+        largest_depth_px = std::max(largest_depth_px, other.largest_depth_px);
+        sum_depth_px += other.sum_depth_px;
+        if (other.largest_normal_deg > largest_normal_deg) {
+            largest_normal_deg = other.largest_normal_deg;
+            normal_pixel = other.normal_pixel;
+        }
+        sum_normal_deg += other.sum_normal_deg;
+        pixels.insert(pixels.end(), other.pixels.begin(), other.pixels.end());
+    }
 };
 
 inline AgainstReference compare_with_reference(const Frame& frame, const Camera& camera,
@@ -57,7 +94,6 @@ inline AgainstReference compare_with_reference(const Frame& frame, const Camera&
     using reference::Vec3;
     using reference::operator+;
     using reference::operator*;
-    constexpr double kDegrees = 57.29577951308232;
     const CameraRays rays = camera_rays(camera, frame.width, frame.height);
     std::vector<AgainstReference> rows(frame.height);
     tbb::parallel_for(0u, frame.height, [&](uint32_t y) {
@@ -101,12 +137,19 @@ inline AgainstReference compare_with_reference(const Frame& frame, const Camera&
                 row.uncertified_right += !frame.certified[i];
                 if (!hit.hit)
                     continue;
-                row.mean_depth_px += depth_px;
-                row.largest_depth_px = std::max(row.largest_depth_px, depth_px);
                 const Vec3 n{frame.normal[3 * i], frame.normal[3 * i + 1], frame.normal[3 * i + 2]};
-                const double deg = kDegrees * std::atan2(reference::length(reference::cross(n, hit.normal)),
-                                                         reference::dot(n, hit.normal));
-                row.mean_normal_deg += deg;
+                const double deg = reference::angle_deg(n, hit.normal);
+                if (depth_px > kDepthOffPx || deg > kNormalOffDeg) {
+                    const Hair hair = closest.hair(ray, hit, rays.step_x, rays.step_y);
+                    const bool of_face = hair.doubt != Doubt::None; // beside a border
+                    row.depths_off += !of_face && depth_px > kDepthOffPx && depth_px * footprint > hair.depth_mm;
+                    row.normals_off[hit.kind] += !of_face && deg > kNormalOffDeg && deg > hair.turn_deg;
+                }
+                ++row.agree;
+                ++row.agree_by_kind[hit.kind];
+                row.sum_depth_px += depth_px;
+                row.largest_depth_px = std::max(row.largest_depth_px, depth_px);
+                row.sum_normal_deg += deg;
                 if (deg > row.largest_normal_deg) {
                     row.largest_normal_deg = deg;
                     row.normal_pixel = {x, y};
@@ -117,7 +160,7 @@ inline AgainstReference compare_with_reference(const Frame& frame, const Camera&
             fault.y = y;
             fault.hair_px = std::numeric_limits<double>::infinity();
             for (const double reach_px : {1e-3, 1e-2, 0.1, 1.0}) {
-                const Doubt doubt = closest.doubt(ray, hit, rays.step_x, rays.step_y, reach_px);
+                const Doubt doubt = closest.hair(ray, hit, rays.step_x, rays.step_y, reach_px).doubt;
                 if (reach_px == 1e-3)
                     fault.doubt = doubt;
                 if (doubt == Doubt::None || (doubt == Doubt::Face && fault.fault != Fault::WrongFace))
@@ -141,33 +184,8 @@ inline AgainstReference compare_with_reference(const Frame& frame, const Camera&
         }
     });
     AgainstReference all;
-    uint64_t agree = 0;
-    for (const AgainstReference& row : rows) {
-        all.rays += row.rays;
-        all.both_hit += row.both_hit;
-        for (size_t k = 0; k < kFaultCount; ++k) {
-            all.faults[k] += row.faults[k];
-            all.doubtful[k] += row.doubtful[k];
-        }
-        all.certified_wrong += row.certified_wrong;
-        all.uncertified += row.uncertified;
-        all.uncertified_right += row.uncertified_right;
-        all.not_finite += row.not_finite;
-        all.open += row.open;
-        all.largest_depth_px = std::max(all.largest_depth_px, row.largest_depth_px);
-        if (row.largest_normal_deg > all.largest_normal_deg) {
-            all.largest_normal_deg = row.largest_normal_deg;
-            all.normal_pixel = row.normal_pixel;
-        }
-        all.mean_depth_px += row.mean_depth_px;
-        all.mean_normal_deg += row.mean_normal_deg;
-        agree += row.both_hit;
-        all.pixels.insert(all.pixels.end(), row.pixels.begin(), row.pixels.end());
-    }
-    for (const FaultyPixel& pixel : all.pixels)
-        agree -= pixel.fault == Fault::WrongDepth || pixel.fault == Fault::WrongFace;
-    all.mean_depth_px /= double(std::max<uint64_t>(agree, 1));
-    all.mean_normal_deg /= double(std::max<uint64_t>(agree, 1));
+    for (const AgainstReference& row : rows)
+        all.add(row);
     return all;
 }
 

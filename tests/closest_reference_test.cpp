@@ -486,7 +486,7 @@ TEST(ClosestReference, ADoubtfulRayIsOneWithinAThousandthOfAPixelOfARim)
         const Ray ray{{0, 0, 100}, {rim + off_px * 1e-4, 0, -1}};
         const ReferenceHit hit = closest.closest(ray);
         EXPECT_EQ(hit.hit, off_px < 0);
-        EXPECT_EQ(closest.doubt(ray, hit, step_x, step_y), std::abs(off_px) < 1e-3 ? Doubt::Tangent : Doubt::None)
+        EXPECT_EQ(closest.hair(ray, hit, step_x, step_y).doubt, std::abs(off_px) < 1e-3 ? Doubt::Tangent : Doubt::None)
             << off_px;
     }
 }
@@ -524,7 +524,7 @@ TEST(ClosestReference, AgreesWithTheCpuTracerOnEveryKind)
     EXPECT_EQ(result.not_finite, 0u);
     EXPECT_EQ(result.open, 0u);
     EXPECT_LT(result.largest_depth_px, 0.01);
-    EXPECT_LT(result.mean_normal_deg, 1e-3);
+    EXPECT_LT(result.mean_normal_deg(), 1e-3);
 }
 
 TEST(ReferenceTracer, PaintsWhatTheCpuTracerPaints)
