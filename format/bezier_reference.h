@@ -47,7 +47,7 @@ public:
     /// Of the control points, patch units.
     Bounds bounds() const;
 
-    static constexpr double kMostOverlap = 0.01;
+    static constexpr double kMostOverlap = 1e-3; // farther out a root is no tracer's (patch_newton.h, kNewtonOutside)
 
 private:
     // w x, w y, w z, w
