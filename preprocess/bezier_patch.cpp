@@ -1,9 +1,12 @@
 #include "preprocess/bezier_patch.h"
 
 #include "preprocess/spline.h"
+#include "preprocess/vec3d.h"
 
+#include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <limits>
 
 namespace trimray {
 namespace {
@@ -68,6 +71,27 @@ void drop_equal_weights(BezierPatch& patch)
 }
 
 } // namespace
+
+Vec3d ControlBox::centre() const
+{
+    return 0.5 * (lo + hi);
+}
+
+double ControlBox::half_diagonal() const
+{
+    return 0.5 * norm(hi - lo);
+}
+
+ControlBox control_box(std::span<const std::array<double, 4>> points)
+{
+    constexpr double kInf = std::numeric_limits<double>::infinity();
+    ControlBox box{{kInf, kInf, kInf}, {-kInf, -kInf, -kInf}};
+    for (const auto& [x, y, z, w] : points) {
+        box.lo = {std::min(box.lo.x, x / w), std::min(box.lo.y, y / w), std::min(box.lo.z, z / w)};
+        box.hi = {std::max(box.hi.x, x / w), std::max(box.hi.y, y / w), std::max(box.hi.z, z / w)};
+    }
+    return box;
+}
 
 std::vector<BezierPatch> decompose(const CadSurface& surface, const Rect2d& domain)
 {

@@ -6,6 +6,7 @@
 #include "preprocess/cad_model.h"
 
 #include <array>
+#include <span>
 #include <vector>
 
 namespace trimray {
@@ -18,6 +19,15 @@ struct BezierPatch {
     Rect2d domain;
     std::vector<std::array<double, 4>> control_points;
 };
+
+/// The box of control points (w x, w y, w z, w) in space, which holds the surface. Domain: weights positive.
+struct ControlBox {
+    Vec3d lo, hi;
+
+    Vec3d centre() const;
+    double half_diagonal() const;
+};
+ControlBox control_box(std::span<const std::array<double, 4>> points);
 
 /// Returns the patches of `surface` over `domain` (cut at its border), row by row. Zero-length spans give no patch. In
 /// periodic directions the domain may lie anywhere and is at most one period long; patches come back shifted into it.
@@ -43,10 +53,18 @@ struct PartFrame {
     double scale_mm = 1;
 };
 
+/// What weights far apart asked for.
+struct AppendedPatches {
+    uint32_t cut = 0;      // Bezier patches that were cut into pieces (patch_cut.h)
+    uint32_t too_fast = 0; // of those, where some piece should have been cut further
+    double uv_face_mm = 0; // how far rounding of uv_face moves a point of a patch that was cut, at most
+};
+
 /// Appends the records of a face's surface over `domain`: one native patch, or its Bezier patches with their control
 /// points (pack_layout.h PatchRecord). Fails: InvalidSurface, UnsupportedSurface (weights not positive, degree above
 /// kMaxDegree).
-Status append_patches(const CadSurface& surface, const Rect2d& domain, const PartFrame& frame, uint32_t face,
-                      std::vector<PatchRecord>& patches, std::vector<float>& control_points);
+Result<AppendedPatches> append_patches(const CadSurface& surface, const Rect2d& domain, const PartFrame& frame,
+                                       uint32_t face, std::vector<PatchRecord>& patches,
+                                       std::vector<float>& control_points);
 
 } // namespace trimray

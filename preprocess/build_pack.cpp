@@ -14,6 +14,7 @@
 #include <limits>
 #include <span>
 
+#include <fmt/format.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
@@ -38,6 +39,7 @@ struct ConvertedFace {
     double inside_fraction = 1;
     std::vector<PatchRecord> patches; // first_control_point relative to control_points
     std::vector<float> control_points;
+    AppendedPatches appended;
 };
 
 /// Share of the uv square inside the loops (even-odd), by 32 scan lines over the pieces. For the estimate A_k of paper
@@ -144,7 +146,7 @@ void convert_surface(ConvertedFace& face, const PartFrame& frame, TrimOptions op
     const auto append = [&] {
         return append_patches(face.cad->surface, face.trims.domain, frame, 0, face.patches, face.control_points);
     };
-    Status appended = append();
+    Result<AppendedPatches> appended = append();
     if (!appended.ok() && options.grow) {
         // beyond its knots a rational spline may have weights that are not positive: then its border stays
         const Vec2d corner = face.trims.domain.lo;
@@ -158,6 +160,8 @@ void convert_surface(ConvertedFace& face, const PartFrame& frame, TrimOptions op
         face.dropped_reason = appended.error().detail;
     else if (face.patches.empty())
         face.dropped_reason = "its surface gave no patch over its domain";
+    else
+        face.appended = *appended;
 }
 
 /// A measure that sizes things, to 12 bits (1e-4 of itself): no decision needs more, and noise does not compress.
@@ -191,6 +195,21 @@ FaceRecord face_record(const ConvertedFace& face, StringTable& strings)
     r.domain_hi[0] = face.trims.domain.hi.x;
     r.domain_hi[1] = face.trims.domain.hi.y;
     return r;
+}
+
+/// Where weights lie so far apart that single precision does not keep what it keeps elsewhere.
+void warn_of_weights(const ConvertedFace& face, double trim_tolerance, std::vector<std::string>& warnings)
+{
+    const AppendedPatches& a = face.appended;
+    if (a.too_fast > 0)
+        warnings.push_back(fmt::format("part {}, face {}: weights so far apart that {} of its patches would have to be "
+                                       "cut finer than they are: rays may pass through it",
+                                       face.part, face.cad->face_in_part, a.too_fast));
+    const double longer_mm = std::max(face.extent.length_u_mm, face.extent.length_v_mm);
+    if (a.cut > 0 && !face.trims.natural_border && a.uv_face_mm > trim_tolerance * longer_mm)
+        warnings.push_back(fmt::format("part {}, face {}: weights so far apart that single-precision parameters round "
+                                       "the points of its trims by up to {:.2g} mm",
+                                       face.part, face.cad->face_in_part, a.uv_face_mm));
 }
 
 /// Gives the faces of a part's closed shells their rims. Domain: converted faces. Returns what is wrong with the part's
@@ -356,6 +375,9 @@ void run(const CadModel& model, const BuildOptions& options, PackImage& image, B
     report.warnings = model.warnings;
     std::copy_if(orientation_warnings.begin(), orientation_warnings.end(), std::back_inserter(report.warnings),
                  [](const std::string& warning) { return !warning.empty(); });
+    for (const ConvertedFace& face : faces)
+        if (face.dropped_reason.empty())
+            warn_of_weights(face, options.trims.tolerance, report.warnings);
 
     start = Clock::now();
     if (!options.compact) // coarse triangles follow from the rest, and no thumbnail needs them

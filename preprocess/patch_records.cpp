@@ -1,11 +1,11 @@
 // CadSurface over a domain -> PatchRecord: frames re-centred on the domain, numbers near 1, single precision.
 #include "preprocess/bezier_patch.h"
+#include "preprocess/patch_cut.h"
 #include "preprocess/vec3d.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 
 #include <fmt/format.h>
 
@@ -119,8 +119,8 @@ NativeSize native_size(const CadSurface& s, const Rect2d& d)
     return n;
 }
 
-Status append_plane(const CadSurface& s, const Rect2d& d, const PartFrame& frame, PatchRecord patch,
-                    std::vector<PatchRecord>& patches)
+Result<AppendedPatches> append_plane(const CadSurface& s, const Rect2d& d, const PartFrame& frame, PatchRecord patch,
+                                     std::vector<PatchRecord>& patches)
 {
     const double u = 0.5 * (d.lo.x + d.hi.x), v = 0.5 * (d.lo.y + d.hi.y);
     const double half_diagonal = 0.5 * std::hypot(d.hi.x - d.lo.x, d.hi.y - d.lo.y);
@@ -132,11 +132,11 @@ Status append_plane(const CadSurface& s, const Rect2d& d, const PartFrame& frame
     map_parameter(patch, 0, d.lo.x, d.hi.x, u, unit);
     map_parameter(patch, 1, d.lo.y, d.hi.y, v, unit);
     patches.push_back(patch);
-    return Done{};
+    return AppendedPatches{};
 }
 
-Status append_quadric_or_torus(const CadSurface& s, const Rect2d& d, const PartFrame& frame, PatchRecord patch,
-                               std::vector<PatchRecord>& patches)
+Result<AppendedPatches> append_quadric_or_torus(const CadSurface& s, const Rect2d& d, const PartFrame& frame,
+                                                PatchRecord patch, std::vector<PatchRecord>& patches)
 {
     const NativeSize size = native_size(s, d);
     if (!(size.bound > 0))
@@ -165,24 +165,7 @@ Status append_quadric_or_torus(const CadSurface& s, const Rect2d& d, const PartF
     }
     map_parameter(patch, 1, lo, hi, v_is_length ? size.v_zero : 0, v_is_length ? unit : 1);
     patches.push_back(patch);
-    return Done{};
-}
-
-/// Centre and half diagonal of the control points' box, in mm.
-struct Hull {
-    Vec3d centre;
-    double half_diagonal = 0;
-};
-
-Hull hull_of(const BezierPatch& bezier)
-{
-    constexpr double kInf = std::numeric_limits<double>::infinity();
-    Vec3d lo{kInf, kInf, kInf}, hi{-kInf, -kInf, -kInf};
-    for (const auto& [x, y, z, w] : bezier.control_points) {
-        lo = {std::min(lo.x, x / w), std::min(lo.y, y / w), std::min(lo.z, z / w)};
-        hi = {std::max(hi.x, x / w), std::max(hi.y, y / w), std::max(hi.z, z / w)};
-    }
-    return {0.5 * (lo + hi), 0.5 * norm(hi - lo)};
+    return AppendedPatches{};
 }
 
 /// Done if the patch can be stored: finite numbers, positive weights within a float's range of each other.
@@ -216,14 +199,15 @@ float control_coordinate(double wx, double w)
 void append_bezier(const BezierPatch& bezier, const Rect2d& d, const PartFrame& frame, PatchRecord patch,
                    std::vector<PatchRecord>& patches, std::vector<float>& control_points)
 {
-    const Hull hull = hull_of(bezier);
-    if (!(hull.half_diagonal > 0))
+    const ControlBox box = control_box(bezier.control_points);
+    const double half_diagonal = box.half_diagonal();
+    if (!(half_diagonal > 0))
         return; // all control points are one: no area
     patch.shape =
         kKindBezier | uint(bezier.degree_u) << 8 | uint(bezier.degree_v) << 16 | (bezier.rational ? kShapeRational : 0);
     patch.first_control_point = static_cast<uint>(control_points.size());
     constexpr double kRoomForGrid = 1.0 + 1.0 / (1 << 20); // the rounded origin and points stay within |q| <= 1
-    const double unit = place(hull.centre, hull.half_diagonal * kRoomForGrid, frame, kBezierOriginBits, patch);
+    const double unit = place(box.centre(), half_diagonal * kRoomForGrid, frame, kBezierOriginBits, patch);
     const Vec3d origin = placed_origin_mm(patch, frame);
     patch.axis_x[0] = patch.axis_y[1] = patch.axis_z[2] = 1;
     const double u_length = bezier.domain.hi.x - bezier.domain.lo.x, v_length = bezier.domain.hi.y - bezier.domain.lo.y;
@@ -338,8 +322,15 @@ BezierPatch nearly_flat_patch(const CadSurface& s, const Rect2d& d)
     return patch;
 }
 
-Status append_splines(const CadSurface& s, const Rect2d& d, const PartFrame& frame, const PatchRecord& patch,
-                      std::vector<PatchRecord>& patches, std::vector<float>& control_points)
+/// How far apart points may be whose uv_face, along one direction, differs by the rounding of 1.
+double rounding_mm(double speed_mm, double patch_length, double domain_length)
+{
+    return 0x1p-24 * speed_mm * domain_length / patch_length;
+}
+
+Result<AppendedPatches> append_splines(const CadSurface& s, const Rect2d& d, const PartFrame& frame,
+                                       const PatchRecord& patch, std::vector<PatchRecord>& patches,
+                                       std::vector<float>& control_points)
 {
     const int degree_u = s.spline.degree_u, degree_v = s.spline.degree_v;
     if (degree_u < 1 || degree_v < 1 || degree_u > int(kMaxDegree) || degree_v > int(kMaxDegree))
@@ -350,19 +341,32 @@ Status append_splines(const CadSurface& s, const Rect2d& d, const PartFrame& fra
         return invalid(s, "the domain lies outside the surface");
     for (const BezierPatch& bezier : beziers)
         if (Status checked = check_numbers(s, bezier); !checked.ok())
-            return checked;
+            return checked.error();
     const size_t before = patches.size();
-    for (const BezierPatch& bezier : beziers)
-        append_bezier(bezier, d, frame, patch, patches, control_points);
+    AppendedPatches appended;
+    for (const BezierPatch& bezier : beziers) {
+        const CutPatch cut = cut_by_weights(bezier);
+        for (const BezierPatch& piece : cut.pieces)
+            append_bezier(piece, d, frame, patch, patches, control_points);
+        if (cut.pieces.size() == 1)
+            continue;
+        const Rect2d& own = bezier.domain;
+        appended.cut += 1;
+        appended.too_fast += cut.too_fast;
+        appended.uv_face_mm =
+            std::max(appended.uv_face_mm, rounding_mm(cut.speed_mm.u, own.hi.x - own.lo.x, d.hi.x - d.lo.x) +
+                                              rounding_mm(cut.speed_mm.v, own.hi.y - own.lo.y, d.hi.y - d.lo.y));
+    }
     if (patches.size() == before)
         return invalid(s, "all control points coincide: the surface has no area");
-    return Done{};
+    return appended;
 }
 
 } // namespace
 
-Status append_patches(const CadSurface& surface, const Rect2d& domain, const PartFrame& frame, uint32_t face,
-                      std::vector<PatchRecord>& patches, std::vector<float>& control_points)
+Result<AppendedPatches> append_patches(const CadSurface& surface, const Rect2d& domain, const PartFrame& frame,
+                                       uint32_t face, std::vector<PatchRecord>& patches,
+                                       std::vector<float>& control_points)
 {
     const Rect2d& d = domain;
     if (!(d.hi.x > d.lo.x) || !(d.hi.y > d.lo.y) || !std::isfinite(d.hi.x - d.lo.x) || !std::isfinite(d.hi.y - d.lo.y))
@@ -381,7 +385,7 @@ Status append_patches(const CadSurface& surface, const Rect2d& domain, const Par
         return append_plane(surface, d, frame, patch, patches);
     if (surface.kind != kKindBezier && nearly_flat(surface, d)) {
         append_bezier(nearly_flat_patch(surface, d), d, frame, patch, patches, control_points);
-        return Done{};
+        return AppendedPatches{};
     }
     if (surface.kind != kKindBezier)
         return append_quadric_or_torus(surface, d, frame, patch, patches);

@@ -1,6 +1,7 @@
 // Evaluation, decomposition and patch records, against the CAD kernel.
 #include "preprocess/bezier_patch.h"
 #include "preprocess/vec3d.h"
+#include "tests/bezier_surface.h"
 #include "tests/occt_surfaces.h"
 #include "tests/random_surfaces.h"
 
@@ -16,6 +17,7 @@
 namespace trimray {
 namespace {
 
+using test::as_surface;
 using test::RandomSurfaces;
 
 Vec3d to_vec(const gp_XYZ& p)
@@ -202,24 +204,6 @@ TEST(evaluate, agrees_with_the_kernel_on_periodic_surfaces_wherever_the_paramete
         EXPECT_LE(d.point, kKernelError);
         EXPECT_LE(d.derivative, kKernelError);
     }
-}
-
-/// A Bezier patch as a surface of its own on [0,1]^2.
-CadSurface as_surface(const BezierPatch& patch)
-{
-    CadSurface s;
-    s.kind = kKindBezier;
-    s.spline.degree_u = patch.degree_u;
-    s.spline.degree_v = patch.degree_v;
-    s.spline.count_u = patch.degree_u + 1;
-    s.spline.count_v = patch.degree_v + 1;
-    s.spline.rational = patch.rational;
-    s.spline.knots_u.assign(patch.degree_u + 1, 0.0);
-    s.spline.knots_u.insert(s.spline.knots_u.end(), patch.degree_u + 1, 1.0);
-    s.spline.knots_v.assign(patch.degree_v + 1, 0.0);
-    s.spline.knots_v.insert(s.spline.knots_v.end(), patch.degree_v + 1, 1.0);
-    s.spline.control_points = patch.control_points;
-    return s;
 }
 
 TEST(decompose, agrees_with_the_kernels_bezier_surfaces)

@@ -182,10 +182,10 @@ TEST(append_patches, refuses_with_a_reason)
     std::vector<PatchRecord> patches;
     std::vector<float> control_points;
     const auto code_of = [&](const CadSurface& s, const Rect2d& d) {
-        const Status status = append_patches(s, d, PartFrame{}, 0, patches, control_points);
-        EXPECT_FALSE(status.ok());
-        EXPECT_TRUE(status.ok() || !status.error().detail.empty());
-        return status.ok() ? ErrorCode::Internal : status.error().code;
+        const auto appended = append_patches(s, d, PartFrame{}, 0, patches, control_points);
+        EXPECT_FALSE(appended.ok());
+        EXPECT_TRUE(appended.ok() || !appended.error().detail.empty());
+        return appended.ok() ? ErrorCode::Internal : appended.error().code;
     };
     const CadSurface good = random.spline(3, 3, true, 2, 2);
     CadSurface s = good;

@@ -48,9 +48,9 @@ inline PackImage random_pack(uint32_t seed, uint parts, uint faces, uint empty_p
                 surface = random.native(kind);
                 domain = random.native_domain(kind);
             }
-            const Status status =
+            const auto appended =
                 append_patches(surface, domain, frame, part.first_face + f, image.patches, image.control_points);
-            EXPECT_TRUE(status.ok()) << (status.ok() ? "" : status.error().detail);
+            EXPECT_TRUE(appended.ok()) << (appended.ok() ? "" : appended.error().detail);
             face.patch_count = uint(image.patches.size()) - face.first_patch;
             image.faces.push_back(face);
         }

@@ -1,7 +1,7 @@
 // Hard case 5: creases inside of a surface, where a knot's multiplicity is the degree, and knots that come oftener
 // still.
-#include "preprocess/build_pack.h"
 #include "tests/hard/closest_hits.h"
+#include "tests/spline_model.h"
 
 #include <cmath>
 
@@ -12,10 +12,7 @@ namespace {
 /// creases, of 4 cuts whose two sides have the same points.
 CadModel zigzag(const std::vector<double>& inner_knots)
 {
-    CadFace face;
-    face.surface.kind = kKindBezier;
-    face.surface.source_kind = "bspline";
-    face.surface.natural_bounds = {{0, 0}, {1, 1}};
+    CadFace face = spline_face({{0, 0}, {1, 1}});
     SplineSurface& s = face.surface.spline;
     s.degree_u = s.degree_v = 3;
     s.knots_u = {0, 0, 0, 0};
@@ -33,11 +30,7 @@ CadModel zigzag(const std::vector<double>& inner_knots)
             s.control_points.push_back({100 * u - 50, 100 * v - 50, 40 * fold(u, 0.5) + 30 * fold(v, 1), 1});
         }
     }
-    CadModel model;
-    model.parts.emplace_back().faces.push_back(face);
-    model.instances.emplace_back();
-    model.tree.emplace_back();
-    return model;
+    return model_of(face);
 }
 
 TEST(case_05, creases_are_borders_of_patches_without_a_crack)
@@ -50,8 +43,7 @@ TEST(case_05, creases_are_borders_of_patches_without_a_crack)
                           Case{{0.25, 0.25, 0.25, 0.25, 0.5, 0.5, 0.5, 0.5, 0.75}, 8}, // cuts
                           Case{{0.25, 0.25, 0.25, 0.2500000001, 0.5, 0.5, 0.5}, 8}}) { // a span that is nearly empty
         BuildReport report;
-        auto scene = std::make_shared<Scene>();
-        scene->pack.image = build_pack(zigzag(c.knots), {}, report);
+        const auto scene = converted(zigzag(c.knots), report);
         const PackImage& image = scene->pack.image;
         EXPECT_EQ(image.dropped.size(), 0u);
         EXPECT_EQ(image.patches.size(), c.patches);

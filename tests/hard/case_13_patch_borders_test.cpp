@@ -1,9 +1,8 @@
 // Hard case 13: leaks at patch borders, where a root just outside of a patch is rejected on both sides. No ray passes
 // between the patches of one face, however narrow they are and however slant the ray.
 #include "preprocess/bezier_patch.h"
-#include "preprocess/build_pack.h"
-#include "runtime/tracer.h"
 #include "tests/hard/closest_hits.h"
+#include "tests/spline_model.h"
 
 #include <gtest/gtest.h>
 
@@ -17,24 +16,6 @@ namespace trimray::hard {
 namespace {
 
 constexpr double kSide_mm = 100;
-
-CadFace spline_face(const Rect2d& domain)
-{
-    CadFace face;
-    face.surface.kind = kKindBezier;
-    face.surface.source_kind = "bspline";
-    face.surface.natural_bounds = domain;
-    return face;
-}
-
-CadModel model_of(const CadFace& face)
-{
-    CadModel model;
-    model.parts.emplace_back().faces.push_back(face);
-    model.instances.emplace_back();
-    model.tree.emplace_back();
-    return model;
-}
 
 /// A bicubic face, wavy, of so many patches along u and one along v.
 CadModel strips(int patches)
@@ -114,8 +95,7 @@ TEST(case_13, no_ray_passes_between_patches_whatever_their_shape_and_its_slant)
         const CadModel model = strips(patches);
         const CadSurface& surface = model.parts[0].faces[0].surface;
         BuildReport report;
-        auto scene = std::make_shared<Scene>();
-        scene->pack.image = build_pack(model, {}, report);
+        const auto scene = converted(model, report);
         ASSERT_EQ(scene->pack.image.patches.size(), size_t(patches));
         const auto cpu = make_cpu_tracer(scene);
         ASSERT_TRUE(cpu.ok());
@@ -134,8 +114,7 @@ TEST(case_13, patches_with_creases_between_them_leave_no_hole_edge_on)
 {
     for (const int patches : {8, 40}) {
         BuildReport report;
-        auto scene = std::make_shared<Scene>();
-        scene->pack.image = build_pack(hills(patches), {}, report);
+        const auto scene = converted(hills(patches), report);
         ASSERT_EQ(scene->pack.image.patches.size(), size_t(patches) * patches);
         std::vector<View> views;
         for (const double height_mm : {30.0, 5.0, 0.5}) { // seen at 14, 2.5 and 0.2 degrees
