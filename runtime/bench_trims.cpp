@@ -4,6 +4,7 @@
 #include "runtime/command_json.h"
 #include "runtime/command_trace.h"
 #include "runtime/cpu_lanes.h"
+#include "runtime/median.h"
 #include "runtime/thread_clock.h"
 #include "runtime/trim_mode.h"
 
@@ -78,13 +79,6 @@ uint64_t trim_bytes(const Contestant& contestant)
     default:
         return bytes.trim_exact;
     }
-}
-
-double median(std::vector<double> values)
-{
-    std::sort(values.begin(), values.end());
-    const size_t middle = values.size() / 2;
-    return values.size() % 2 == 1 ? values[middle] : 0.5 * (values[middle - 1] + values[middle]);
 }
 
 /// The queries of a picture: those that are asked, and how the modes answer them.

@@ -40,7 +40,7 @@ const Choice& trim_choice()
 
 const Choice& closest_choice()
 {
-    static const Choice choice{"--closest", {"stochastic", "certified"}, {"certified"}};
+    static const Choice choice{"--closest", {"certified", "stochastic"}, {"certified", "stochastic"}};
     return choice;
 }
 
@@ -66,6 +66,16 @@ Status check_choice(const Choice& choice, const std::string& value)
     return Error{ErrorCode::Usage, choice.option,
                  fmt::format("expected one of {}, found '{}'{}", fmt::join(choice.known, ", "), value,
                              near.empty() ? "" : fmt::format("; did you mean '{}'?", near))};
+}
+
+ClosestPolicy closest_policy(const std::string& name)
+{
+    return name == "stochastic" ? ClosestPolicy::Stochastic : ClosestPolicy::Certified;
+}
+
+const char* closest_name(ClosestPolicy policy)
+{
+    return policy == ClosestPolicy::Stochastic ? "stochastic" : "certified";
 }
 
 TrimMode trim_mode(const std::string& name)

@@ -26,6 +26,9 @@ Status check_choice(const Choice& choice, const std::string& value);
 
 /// Domain: names of trim_choice().available.
 TrimMode trim_mode(const std::string& name);
+/// Domain: names of closest_choice().available.
+ClosestPolicy closest_policy(const std::string& name);
+const char* closest_name(ClosestPolicy policy);
 
 /// A tracer for `device`: "cpu", "vulkan" (software drivers too), "reference", or "auto": a hardware GPU where there is
 /// one, else the CPU; `note` says which and why. Fails: NoDevice, DeviceFailed, UnsupportedPackFeature.

@@ -6,8 +6,10 @@
 #include "runtime/cpu_view.h"
 #include "runtime/edge_lines.h"
 #include "runtime/frame_effects.h"
+#include "runtime/stochastic_frames.h"
 #include "runtime/tracer.h"
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <string>
@@ -64,6 +66,12 @@ struct EdgeJob {
     const BlockLineDrawer* drawer; // null: lines are drawn over the frame, not over each block
 };
 
+/// One frame of ClosestPolicy::Stochastic.
+struct StochasticJob {
+    std::array<float, 2> start; // start_of_frame
+    KeptHits* kept;             // null: there is one frame alone
+};
+
 struct BlockJob {
     const CpuScene& scene;
     const View& view;
@@ -74,7 +82,8 @@ struct BlockJob {
     const KdTrims* kd = nullptr;              // TrimMode::Kd has them
     const TrimReference* reference = nullptr; // TrimMode::Reference has one
     bool record_trim_queries = false;
-    const EdgeJob* edges = nullptr; // null: nobody asks for borders
+    const EdgeJob* edges = nullptr;            // null: nobody asks for borders
+    const StochasticJob* stochastic = nullptr; // null: ClosestPolicy::Certified
 };
 
 /// Traces the block into `frame`, whose arrays have their size.

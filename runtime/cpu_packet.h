@@ -13,10 +13,12 @@
 #include "runtime/cpu_evaluate.h"
 #include "runtime/cpu_fetch.h"
 #include "runtime/cpu_lanes.h"
+#include "runtime/cpu_stochastic.h"
 #include "runtime/cpu_trim.h"
 #include "runtime/cpu_trim_reference.h"
 #include "runtime/cpu_write.h"
 #include "shaders/shared/leaf_box.h"
+#include "shaders/shared/leaf_start.h"
 #include "shaders/shared/patch_newton.h"
 #include "shaders/shared/quadric.h"
 #include "shaders/shared/rim.h"
@@ -49,6 +51,7 @@ public:
             offset_y[i] = float(i / 4) + 0.5f - middle_y;
         }
         const bool has_borders = job_.edges && edges_.concerns(scratch_.candidates);
+        const bool keeps = job_.stochastic && job_.stochastic->kept;
         const bool draws_lines = has_borders && job_.edges->drawer; // once it is traced; until then the block is kept
         for (uint32_t ty = block.y0; ty < block.y1; ty += kTileSide) {
             const uint32_t tile_y1 = std::min(ty + kTileSide, block.y1);
@@ -62,7 +65,10 @@ public:
                         packet.x = load(offset_x) + real(float(x));
                         packet.y = load(offset_y) + real(float(y));
                         packet.alive = packet.x < float(tile.x1) - middle_x && packet.y < float(tile.y1) - middle_y;
-                        const PacketHit hit = trace_twice(packet, pixel_rect({x, y, x + 4, y + 4}));
+                        kept_ = keeps ? &job_.stochastic->kept->of_packet(x, y) : nullptr;
+                        PacketHit hit = trace_twice(packet, pixel_rect({x, y, x + 4, y + 4}));
+                        if (keeps)
+                            keep_nearer(hit, packet.alive, *kept_);
                         write_packet(job_, packet, hit, x - block.x0, y - strip_y0, scratch_.strip, work_);
                         if (has_borders)
                             edges_.find(packet, hit, x, y, &scratch_.strip.rgba[y - strip_y0][4 * (x - block.x0)]);
@@ -133,8 +139,12 @@ private:
         hit.uv_face = real2(real(0.0f), real(0.0f));
         hit.normal = real3(real(0.0f), real(0.0f), real(1.0f));
         hit.back = mask(false);
-        hit.doubt = real(kHuge);
+        hit.doubt = real(job_.stochastic ? -kHuge : kHuge); // plain Newton claims nothing
         float farthest = kHuge;
+        if (kept_ != nullptr) {
+            load_kept(*kept_, packet.alive, hit);
+            farthest = largest_lane(hit.best);
+        }
         recent_count_ = 0;
         for (size_t first = 0; first < tile_count_; first += kLanes) {
             if (scratch_.near_mm[first] > farthest)
@@ -270,6 +280,8 @@ private:
                       base + per_t * in_box.far > -float(job_.view.tau_ref);
         if (!any_lane(moving))
             return;
+        if (job_.stochastic)
+            return intersect_once(target, box, moving, origin, direction, hit);
         const PatchRecord& patch = target.patch;
         const int degree_u = int(patch.shape >> 8 & 0xffu), degree_v = int(patch.shape >> 16 & 0xffu);
         const real2 middle = scalar2(0.5f * (box.uv_lo.x + box.uv_hi.x), 0.5f * (box.uv_lo.y + box.uv_hi.y));
@@ -345,6 +357,47 @@ private:
         }
         offer(target, near, t, uv, normal, hit);
         return grazing;
+    }
+
+    /// Plain Newton from the frame's start in the leaf, in the lanes `moving`.
+    HWY_ATTR HWY_NOINLINE void intersect_once(Target& target, const LeafBox& box, mask moving, real3 origin,
+                                              real3 direction, PacketHit& hit)
+    {
+        const PatchRecord& patch = target.patch;
+        const int degree_u = int(patch.shape >> 8 & 0xffu), degree_v = int(patch.shape >> 16 & 0xffu);
+        const Evaluate of_degree = find_evaluate(patch.shape);
+        const auto evaluate = [&](real2 uv) HWY_ATTR {
+            return of_degree(source_, patch.first_control_point, degree_u, degree_v, uv);
+        };
+        const auto count = [&](mask lanes) HWY_ATTR { work_.newton_steps += lane_count(lanes); };
+        const RayPlanes planes = ray_planes(origin, direction);
+        const auto [start_u, start_v] = job_.stochastic->start;
+        const PlainEnd end =
+            plain_newton(evaluate, count, planes, box, last_residual(job_.error_px * target.view.pixel),
+                         leaf_start(scalar2(start_u, start_v), box.uv_lo, box.uv_hi), moving);
+        if (!any_lane(end.settled))
+            return;
+        const real2 overlap = patch_overlap(end.s, planes, patch_rounding(degree_u, degree_v));
+        const mask inside =
+            end.settled && abs(end.uv.x - 0.5f) <= 0.5f + overlap.x && abs(end.uv.y - 0.5f) <= 0.5f + overlap.y;
+        const real t = dot(end.s.p - origin, direction) / dot(direction, direction);
+        const mask near = inside && in_range(target, t, hit);
+        if (any_lane(near))
+            offer(target, near, t, end.uv, patch_normal(evaluate, end.s, end.uv, near), hit);
+    }
+
+    /// S_u x S_v at uv, where the patch's point is s; at a pole or along a degenerate side the one a little way inside.
+    template <class EvaluateAt>
+    HWY_ATTR HWY_INLINE static real3 patch_normal(EvaluateAt evaluate, const SurfacePoint& s, real2 uv, mask asked)
+    {
+        const real3 normal = cross(s.du, s.dv);
+        const mask flat = dot(normal, normal) <= 1e-10f * dot(s.du, s.du) * dot(s.dv, s.dv) ||
+                          dot(s.du, s.du) <= 1e-10f * dot(s.dv, s.dv) || dot(s.dv, s.dv) <= 1e-10f * dot(s.du, s.du);
+        if (!any_lane(asked && flat))
+            return normal;
+        constexpr float kInwards = 1.0f / 2048;
+        const SurfacePoint inside = evaluate(uv + real2(0.5f - uv.x, 0.5f - uv.y) * real(kInwards));
+        return select(flat, cross(inside.du, inside.dv), normal);
     }
 
     HWY_ATTR SurfacePoint evaluate(const NewtonPatch& patch, real2 uv) const
@@ -454,7 +507,8 @@ private:
     size_t tile_count_ = 0;
     uint64_t recent_[8];
     uint recent_count_ = 0;
-    bool rims_cut_ = false; // rims are no surface
+    bool rims_cut_ = false;      // rims are no surface
+    KeptPacket* kept_ = nullptr; // of the packet at hand, where hits are kept from frame to frame
 };
 
 SHARED_CLOSE

@@ -73,10 +73,13 @@ public:
         const int threads =
             options.threads > 0 ? int(std::min(options.threads, 1024u)) : tbb::info::default_concurrency();
         tbb::task_arena arena(threads);
+        kept_ = keeps_hits(options) ? no_hits(options.width, options.height) : KeptHits{};
         for (uint32_t i = 0; i < std::max(options.frames, 1u); ++i) {
             const auto start = std::chrono::steady_clock::now();
             const double cpu_start = thread_cpu_seconds();
-            stats.work = render_once(options, stats.trim, threads, arena, frame);
+            const WorkCounts work = render_once(options, stats.trim, i, threads, arena, frame);
+            if (i == 0)
+                stats.work = work;
             const std::chrono::duration<double, std::milli> spent = std::chrono::steady_clock::now() - start;
             stats.frame_ms.push_back(spent.count());
             if (threads == 1)
@@ -87,8 +90,8 @@ public:
     }
 
 private:
-    WorkCounts render_once(const RenderOptions& options, TrimMode trim, int threads, tbb::task_arena& arena,
-                           Frame& frame)
+    WorkCounts render_once(const RenderOptions& options, TrimMode trim, uint32_t frame_number, int threads,
+                           tbb::task_arena& arena, Frame& frame)
     {
         const CameraRays rays = camera_rays(options.camera, options.width, options.height);
         View view = make_view(cpu_scene_->image, rays, options.width, options.height);
@@ -102,6 +105,9 @@ private:
             job.reference = reference_.get();
             job.record_trim_queries = options.record_trim_queries;
         }
+        const StochasticJob stochastic{start_of_frame(frame_number), keeps_hits(options) ? &kept_ : nullptr};
+        if (options.closest == ClosestPolicy::Stochastic)
+            job.stochastic = &stochastic;
         const bool effects = has_effects(options);
         std::optional<BlockLineDrawer> drawer;
         std::optional<EdgeJob> edges;
@@ -157,6 +163,7 @@ private:
     tbb::enumerable_thread_specific<BlockScratch> scratch_;
     std::optional<BorderCells> border_cells_; // once a picture asks for borders
     EdgeMap edge_map_;
+    KeptHits kept_; // of the picture at hand, where ClosestPolicy::Stochastic makes it in several frames
 };
 
 } // namespace

@@ -105,18 +105,18 @@ struct PacketPixels {
     alignas(16) uint8_t certified[kLanes];
 };
 
-constexpr PacketPixels missed_pixels()
+constexpr PacketPixels missed_pixels(bool certified)
 {
     PacketPixels pixels{};
     for (int i = 0; i < kLanes; ++i) {
         pixels.depth[i] = std::numeric_limits<float>::infinity();
         pixels.face[i] = pixels.instance[i] = ~0u;
-        pixels.certified[i] = 1;
+        pixels.certified[i] = certified;
     }
     return pixels;
 }
 // a constant, for code that runs before main must not need this instruction set
-constexpr PacketPixels kMissedPixels = missed_pixels();
+constexpr PacketPixels kMissedPixels = missed_pixels(true), kDoubtfulMisses = missed_pixels(false);
 
 HWY_INLINE void copy_to_strip(const PacketPixels& pixels, uint32_t x, uint32_t y, Strip& strip)
 {
@@ -169,6 +169,11 @@ HWY_INLINE void copy_to_strip(const PacketPixels& pixels, uint32_t x, uint32_t y
 {
     const mask hits = packet.alive && hit.best < kHuge;
     const uint hit_lanes = lane_bits(hits);
+    if (hit_lanes == 0 && job.stochastic) {
+        copy_to_strip(kDoubtfulMisses, x, y, strip);
+        work.uncertified_pixels += uint64_t(__builtin_popcount(lane_bits(packet.alive)));
+        return;
+    }
     if (hit_lanes == 0 && !any_lane(packet.alive && hit.doubt < kHuge)) {
         copy_to_strip(kMissedPixels, x, y, strip);
         return;

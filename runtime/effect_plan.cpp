@@ -157,7 +157,9 @@ std::vector<EffectItem> effect_plan(const PackImage& image, const RenderOptions&
     add_colors(image, plan);
     const size_t flagged =
         count_if(image.leaves, [](const LeafRecord& leaf) { return ((leaf.quat_z_flags >> 16) & kLeafFlagged) != 0; });
-    if (flagged > 0)
+    if (options.closest == ClosestPolicy::Stochastic)
+        plan.push_back({"stochastic-starts", "asked for: one start a leaf and frame, the nearest hit of all frames"});
+    else if (flagged > 0)
         plan.push_back({"many-starts", fmt::format("{} not certified to hold one hit a ray, of {}",
                                                    counted(flagged, "leaf is", "leaves are"), image.leaves.size())});
     if (options.shade) {

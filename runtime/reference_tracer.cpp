@@ -60,6 +60,8 @@ public:
             return Error{ErrorCode::Usage, "--device reference",
                          "draws no lines and smooths no borders; leave out --edges, --silhouettes, --style and "
                          "--antialias, or use --device cpu"};
+        if (options.closest == ClosestPolicy::Stochastic)
+            return Error{ErrorCode::Usage, "--device reference", "draws no starts; --closest must be certified"};
         if (options.trim == TrimMode::Sdf || options.trim == TrimMode::Hybrid || options.trim == TrimMode::Kd)
             return Error{ErrorCode::Usage, "--device reference",
                          "counts crossings of the trims' pieces and reads nothing else; --trim must be auto or exact"};

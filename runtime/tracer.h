@@ -31,6 +31,14 @@ Result<std::shared_ptr<const Scene>> load_scene(const std::string& path, bool pr
 /// two modes differ by trim decisions alone.
 enum class TrimMode { Auto, Exact, Sdf, Hybrid, Kd, Reference };
 
+/// How a leaf of a Bezier patch is searched for the nearest hit.
+enum class ClosestPolicy {
+    Certified, // many starts where it may hold several hits; the first frame is the picture, all others are the same
+    // The paper's: plain Newton from one start a frame, the leaf's middle in the first and drawn anew in later ones;
+    // each pixel keeps the nearest hit of all frames. No pixel is certified
+    Stochastic,
+};
+
 /// Trim queries of a packet of 16 rays against one face: those in the lanes whose bits are set in `asked`.
 struct TrimQueries {
     alignas(64) float u[16]; // uv_face
@@ -52,6 +60,7 @@ struct RenderOptions {
     uint32_t width = 1280, height = 720;
     Camera camera;
     TrimMode trim = TrimMode::Auto;
+    ClosestPolicy closest = ClosestPolicy::Certified;
     uint32_t threads = 0;             // 0: all cores
     uint32_t frames = 1;              // timed frames; the picture is the last one's
     float error_px = 0.02f;           // stop of Newton's iteration, in pixels
@@ -95,7 +104,7 @@ struct RenderStats {
     std::vector<double> frame_ms; // tracing and shading, not loading or compiling
     // processor time of the same, on the CPU with one thread: what other programs take is not in it. Otherwise empty
     std::vector<double> frame_cpu_ms;
-    WorkCounts work; // of one frame
+    WorkCounts work; // of one frame, the first
     TrimMode trim = TrimMode::Exact;
     uint64_t kd_bytes = 0;                 // of the kd-trees, in the mode kd; otherwise there are none
     uint64_t border_bytes = 0;             // of the borders' cells, where lines or smoothed trims ask for them; else 0

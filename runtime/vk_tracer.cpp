@@ -2,6 +2,7 @@
 // band, and reads the last frame's pixels back.
 #include "runtime/border_cells.h"
 #include "runtime/frame_effects.h"
+#include "runtime/stochastic_frames.h"
 #include "runtime/tracer.h"
 #include "runtime/trim_mode.h"
 #include "runtime/vk_buffer.h"
@@ -15,8 +16,10 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <chrono>
 #include <cstring>
+#include <deque>
 #include <functional>
 #include <limits>
 #include <utility>
@@ -69,9 +72,11 @@ private:
     using Specialisation = std::array<uint32_t, kFrameSpecs>;
 
     Status upload_trims(TrimMode trim);
-    Result<ComputePipeline*> pipeline(TrimMode trim, bool shade, bool count, bool edges);
+    Result<ComputePipeline*> pipeline(TrimMode trim, const RenderOptions& options, bool count);
     Status prepare_frame(const FrameSetup& setup, uint32_t rows_per_band);
     Status prepare_edges(const RenderOptions& options, uint32_t rows_per_band);
+    Status prepare_kept(const RenderOptions& options);
+    Status forget_kept();
     Status clear_counts();
     Result<std::array<uint64_t, kFrameCounts>> read_counts();
     Result<double> time_dispatch(const ComputePipeline& pipeline, const FrameView& view, uint32_t groups_x,
@@ -100,7 +105,7 @@ private:
     VulkanBuffer retries_upload_; // of kMostRetries indices
     VulkanBuffer counts_readback_;
     QueryPool timestamps_;
-    std::vector<std::pair<Specialisation, ComputePipeline>> pipelines_;
+    std::deque<std::pair<Specialisation, ComputePipeline>> pipelines_; // pointers handed out stay good
 };
 
 Status VulkanTracer::upload()
@@ -158,7 +163,7 @@ Status VulkanTracer::upload_trims(TrimMode trim)
     return Done{};
 }
 
-Result<ComputePipeline*> VulkanTracer::pipeline(TrimMode trim, bool shade, bool count, bool edges)
+Result<ComputePipeline*> VulkanTracer::pipeline(TrimMode trim, const RenderOptions& options, bool count)
 {
     Specialisation constants{};
     constants[kSpecTrimMode] = trim == TrimMode::Sdf      ? kTrimByTexture
@@ -166,12 +171,14 @@ Result<ComputePipeline*> VulkanTracer::pipeline(TrimMode trim, bool shade, bool 
                                : trim == TrimMode::Kd     ? kTrimByKd
                                                           : kTrimByCells;
     constants[kSpecKinds] = facts_.kinds;
-    constants[kSpecFeatures] =
-        facts_.features | (shade ? kFeatureShade : 0) | (count ? kFeatureCount : 0) | (edges ? kFeatureEdges : 0);
+    const bool stochastic = options.closest == ClosestPolicy::Stochastic;
+    constants[kSpecFeatures] = facts_.features | (options.shade ? kFeatureShade : 0) | (count ? kFeatureCount : 0) |
+                               (edges_wanted_ ? kFeatureEdges : 0) | (stochastic ? kFeatureStochastic : 0) |
+                               (keeps_hits(options) ? kFeatureKept : 0);
     constants[kSpecStackSize] = facts_.stack_size;
     if (device_->is_software()) {
         constants[kSpecLocalFloats] = facts_.largest_net_floats <= kMostLocalFloats ? facts_.largest_net_floats : 0;
-        constants[kSpecIterationLimit] = edges ? kSoftwareIterationLimitWithEdges : kSoftwareIterationLimit;
+        constants[kSpecIterationLimit] = edges_wanted_ ? kSoftwareIterationLimitWithEdges : kSoftwareIterationLimit;
     }
     for (auto& [made_for, made] : pipelines_)
         if (made_for == constants)
@@ -180,7 +187,6 @@ Result<ComputePipeline*> VulkanTracer::pipeline(TrimMode trim, bool shade, bool 
         ComputePipeline::create(*device_, kPrimarySpirv, kFrameBindings, sizeof(FrameView), constants);
     if (!made)
         return made.error();
-    pipelines_.reserve(16); // pointers handed out stay good; the modes are fewer
     pipelines_.emplace_back(constants, std::move(*made));
     return &pipelines_.back().second;
 }
@@ -240,6 +246,33 @@ Status VulkanTracer::prepare_edges(const RenderOptions& options, uint32_t rows_p
         edge_map_.resize(options.width, options.height, query.line_reach_px > 0, query.border_reach_px > 0);
     }
     return Done{};
+}
+
+// Makes the buffer of what pixels keep from frame to frame, if that there is too small. A picture of one frame, or
+// certified, has one element.
+Status VulkanTracer::prepare_kept(const RenderOptions& options)
+{
+    const size_t pixels = keeps_hits(options) ? size_t{options.width} * options.height : 1;
+    const size_t bytes = pixels * sizeof(KeptHit);
+    if (buffers_[kBindKept].size_bytes() >= bytes)
+        return Done{};
+    if (const uint32_t most = device_->properties().limits.maxStorageBufferRange; bytes > most)
+        return Error{ErrorCode::Usage, "--frames",
+                     fmt::format("{} pixels keep their hits from frame to frame; this device holds those of {}", pixels,
+                                 most / sizeof(KeptHit))};
+    Result<VulkanBuffer> kept = VulkanBuffer::create(*device_, BufferUse::Storage, bytes, "the hits kept");
+    if (!kept)
+        return kept.error();
+    buffers_[kBindKept] = std::move(*kept);
+    return Done{};
+}
+
+Status VulkanTracer::forget_kept()
+{
+    return device_->run([&](VkCommandBuffer commands) {
+        device_->vk().vkCmdFillBuffer(commands, buffers_[kBindKept].handle(), 0, VK_WHOLE_SIZE,
+                                      std::bit_cast<uint32_t>(kNothingKept));
+    });
 }
 
 Status VulkanTracer::clear_counts()
@@ -490,14 +523,16 @@ Result<Frame> VulkanTracer::render(const RenderOptions& options, RenderStats& st
         return ready.error();
     if (const Status ready = prepare_edges(options, rows_per_band); !ready)
         return ready.error();
+    if (const Status ready = prepare_kept(options); !ready)
+        return ready.error();
 
     // With one frame it counts its work itself; with more an untimed one before them does
     const uint32_t frames = std::max(options.frames, 1u);
     const bool count_apart = frames > 1;
-    const Result<ComputePipeline*> counting = pipeline(*trim, options.shade, true, edges_wanted_);
+    const Result<ComputePipeline*> counting = pipeline(*trim, options, true);
     if (!counting)
         return counting.error();
-    const Result<ComputePipeline*> timed = pipeline(*trim, options.shade, !count_apart, edges_wanted_);
+    const Result<ComputePipeline*> timed = pipeline(*trim, options, !count_apart);
     if (!timed)
         return timed.error();
     std::array<const VulkanBuffer*, kFrameBindings> bound{};
@@ -511,9 +546,20 @@ Result<Frame> VulkanTracer::render(const RenderOptions& options, RenderStats& st
 
     if (const Status cleared = clear_counts(); !cleared)
         return cleared.error();
-    if (count_apart)
-        if (const Result<double> ms = trace_frame(**counting, setup->view, rows_per_band, nullptr); !ms)
+    FrameView view = setup->view;
+    const auto choose_start = [&view](uint32_t frame) {
+        const std::array<float, 2> start = start_of_frame(frame);
+        std::copy(start.begin(), start.end(), view.start);
+    };
+    choose_start(0);
+    if (const Status none = forget_kept(); !none)
+        return none.error();
+    if (count_apart) {
+        if (const Result<double> ms = trace_frame(**counting, view, rows_per_band, nullptr); !ms)
             return ms.error();
+        if (const Status none = forget_kept(); !none)
+            return none.error();
+    }
     Frame frame;
     const size_t pixels = size_t{options.width} * options.height;
     frame.width = options.width;
@@ -533,7 +579,8 @@ Result<Frame> VulkanTracer::render(const RenderOptions& options, RenderStats& st
     for (uint32_t i = 0; i < frames; ++i) {
         // a software driver's frames are always read: only that shows what must be traced again
         const bool read = i + 1 == frames || device_->is_software() || has_effects(options);
-        const Result<double> ms = trace_frame(**timed, setup->view, rows_per_band, read ? &frame : nullptr);
+        choose_start(i);
+        const Result<double> ms = trace_frame(**timed, view, rows_per_band, read ? &frame : nullptr);
         if (!ms)
             return ms.error();
         // what the host draws counts as much as what the device traces

@@ -32,6 +32,7 @@ struct FrameView {
     float line_reach_px;
     float border_reach_px;
     uint line_classes; // bit kEdge...
+    float start[2];    // with kFeatureStochastic: start_of_frame (runtime/stochastic_frames.h)
     uint alone;        // 1: each workgroup traces pixel retries[workgroup] of the band, with one of its invocations
 };
 
@@ -69,6 +70,16 @@ TRIMRAY_CONST uint kPixelHit = 1u;
 TRIMRAY_CONST uint kPixelCertified = 2u;
 TRIMRAY_CONST uint kPixelStopped = 4u; // the driver's loop limit was near, so the walk was ended
 
+// What a pixel keeps from frame to frame: Hit (shaders/leaf_hit.glsl)
+struct KeptHit {
+    float past; // kHuge: none yet
+    float t;
+    float uv_face[2];
+    float uv_patch[2];
+    uint leaf;
+    uint instance;
+};
+
 // Sums over a frame as pairs of words, low word first; kCount is the pair.
 TRIMRAY_CONST uint kCountRays = 0u;
 TRIMRAY_CONST uint kCountNodes = 1u;
@@ -95,9 +106,11 @@ TRIMRAY_CONST uint kTrimByKd = 3u;
 TRIMRAY_CONST uint kFeatureTrims = 1u;    // some face has trims
 TRIMRAY_CONST uint kFeatureRational = 2u; // some Bezier patch is rational
 TRIMRAY_CONST uint kFeatureShade = 4u;
-TRIMRAY_CONST uint kFeatureCount = 8u;  // work counts are wanted
-TRIMRAY_CONST uint kFeatureEdges = 16u; // edge words of each pixel are wanted
-TRIMRAY_CONST uint kFeatureRims = 32u;  // some face has a rim
+TRIMRAY_CONST uint kFeatureCount = 8u;       // work counts are wanted
+TRIMRAY_CONST uint kFeatureEdges = 16u;      // edge words of each pixel are wanted
+TRIMRAY_CONST uint kFeatureRims = 32u;       // some face has a rim
+TRIMRAY_CONST uint kFeatureStochastic = 64u; // ClosestPolicy::Stochastic
+TRIMRAY_CONST uint kFeatureKept = 128u;      // ... in more frames than one
 
 TRIMRAY_CONST uint kGroupSide = 8u; // workgroups are 8 x 8 pixels
 
@@ -123,12 +136,14 @@ TRIMRAY_CONST uint kBindKdNodes = 16u;
 TRIMRAY_CONST uint kBindKdRuns = 17u;
 TRIMRAY_CONST uint kBindKdPoints = 18u;
 TRIMRAY_CONST uint kBindKdFaces = 19u;
-TRIMRAY_CONST uint kFrameBindings = 20u;
+TRIMRAY_CONST uint kBindKept = 20u; // a KeptHit a pixel of the picture; of one element without kFeatureKept
+TRIMRAY_CONST uint kFrameBindings = 21u;
 
 #ifdef __cplusplus
-static_assert(sizeof(FrameView) == 108);
+static_assert(sizeof(FrameView) == 116);
 static_assert(sizeof(FrameInstance) == 144);
 static_assert(sizeof(FramePixel) == 52);
+static_assert(sizeof(KeptHit) == 32);
 } // namespace trimray
 #endif
 

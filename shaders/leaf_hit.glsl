@@ -335,6 +335,8 @@ bool newton_from(PatchRay ray, PatchRecord patch, FaceRecord face, LeafBox box, 
     return grazing;
 }
 
+#include "shaders/stochastic.glsl"
+
 // Newton from the leaf's middle, and from its other starts where it may hold more roots than one
 void bezier_hit(PatchRay ray, PatchRecord patch, FaceRecord face, LeafBox box, float box_past, uint leaf, uint instance,
                 bool rims, inout Hit hit)
@@ -350,6 +352,10 @@ void bezier_hit(PatchRay ray, PatchRecord patch, FaceRecord face, LeafBox box, f
     newton.box_past = box_past;
     newton.work = 1u + bezier_iterations(newton.degree_u, newton.degree_v);
     newton.rims = rims;
+    if (has_feature(kFeatureStochastic)) {
+        newton_once(ray, patch, face, box, newton, leaf, instance, hit);
+        return;
+    }
     vec2 uv = 0.5f * (box.uv_lo + box.uv_hi);
     bool again = (box.flags & kLeafFlagged) != 0u;
     for (int start = 0; start <= kMoreStarts; ++start) {

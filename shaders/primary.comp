@@ -16,6 +16,7 @@
 #include "shaders/shared/edge.h"
 #include "shaders/shared/language.h"
 #include "shaders/shared/leaf_box.h"
+#include "shaders/shared/leaf_start.h"
 #include "shaders/shared/patch_newton.h"
 #include "shaders/shared/precision.h"
 #include "shaders/shared/quadric.h"
@@ -277,14 +278,27 @@ void main()
     if (active_here) {
         vec2 pixel = vec2(float(at.x) + 0.5f - view.middle[0], float(at.y + view.first_row) + 0.5f - view.middle[1]);
         vec3 across = pixel.x * vector(view.step_x) + pixel.y * vector(view.step_y);
+        uint kept_pixel = (view.first_row + at.y) * view.width + at.x;
+        Hit before = Hit(kHuge, 0.0f, vec2(0.0f), vec2(0.0f), 0xffffffffu, 0xffffffffu, kHuge, false);
+        if (has_feature(kFeatureKept))
+            before = load_kept(kept_pixel);
+        if (has_feature(kFeatureStochastic))
+            before.doubt = -kHuge; // plain Newton claims nothing
         Hit hit;
         bool complete;
         for (int attempt = 0; attempt < 2; ++attempt) {
-            hit = Hit(kHuge, 0.0f, vec2(0.0f), vec2(0.0f), 0xffffffffu, 0xffffffffu, kHuge, false);
+            hit = before;
             complete = walk(pixel, across, hit);
             if (!complete || !hit.back || rims_cut)
                 break;
             rims_cut = true;
+        }
+        if (has_feature(kFeatureKept)) {
+            // a pixel changes only where its new hit is nearer than what was kept
+            if (complete && hit.past < before.past)
+                store_kept(kept_pixel, hit);
+            else
+                hit = before;
         }
         FramePixel result = miss_pixel(hit.doubt < kHuge);
         if (hit.past < kHuge)

@@ -19,6 +19,7 @@ layout(scalar, set = 0, binding = kBindKdNodes) readonly buffer KdNodes { KdNode
 layout(scalar, set = 0, binding = kBindKdRuns) readonly buffer KdRuns { KdRun kd_runs[]; };
 layout(scalar, set = 0, binding = kBindKdPoints) readonly buffer KdPoints { vec2 kd_points[]; };
 layout(scalar, set = 0, binding = kBindKdFaces) readonly buffer KdFaces { KdFace kd_faces[]; };
+layout(scalar, set = 0, binding = kBindKept) buffer KeptHits { KeptHit kept_hits[]; };
 layout(scalar, push_constant) uniform View { FrameView view; };
 
 // Specialised to what the pack holds and the frame asks for: what is false here costs no instruction.

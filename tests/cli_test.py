@@ -397,10 +397,25 @@ class Render(CliTest):
             self.fails(1, "render", PACK, "-o", WORK / "g.png", "--device", "reference", option, value,
                        says=["--device reference", option])
 
+    def test_stochastic_frames_are_kept_and_claim_nothing(self):
+        reports, pictures = {}, {}
+        for closest in ["certified", "stochastic"]:
+            for frames in [1, 4]:
+                out = WORK / f"{closest}{frames}.png"
+                report = self.json_of("render", PACK, "-o", out, "--size", "64x48", "--device", "cpu", "--closest", closest,
+                                      "--frames", frames, "--json")
+                self.assertEqual((report["closest"], report["frames"]), (closest, frames))
+                self.assertEqual("stochastic-starts" in report["effects"], closest == "stochastic")
+                reports[closest, frames], pictures[closest, frames] = report, out.read_bytes()
+        self.assertEqual(pictures["certified", 1], pictures["certified", 4])
+        self.assertEqual(reports["stochastic", 4]["uncertified_pixels"], 64 * 48)
+        for value, says in [("certain", ["certified, stochastic"]), ("stochastik", ["did you mean 'stochastic'"])]:
+            self.fails(1, "render", PACK, "-o", WORK / "g.png", "--closest", value, says=["--closest", *says])
+        self.fails(1, "render", PACK, "-o", WORK / "g.png", "--closest", "stochastic", "--device", "reference",
+                   says=["--device reference", "--closest"])
+
     def test_modes_that_do_not_exist_name_those_that_do(self):
-        for option, value in [("--closest", "stochastic"), ("--scene", "a.json")]:
-            self.fails(4, "render", PACK, "-o", WORK / "f.png", option, value, says=[option])
-        self.fails(4, "render", PACK, "-o", WORK / "f.png", "--closest", "stochastic", says=["certified"])
+        self.fails(4, "render", PACK, "-o", WORK / "f.png", "--scene", "a.json", says=["--scene"])
         self.fails(4, "render", PACK, "-o", WORK / "f.jpg", says=["f.jpg", ".png", ".exr"])
         self.assertFalse((WORK / "f.png").exists())
 
