@@ -3,7 +3,6 @@
 #include "format/record_surface.h"
 
 #include <algorithm>
-#include <cassert>
 #include <cmath>
 #include <limits>
 
@@ -69,16 +68,6 @@ std::array<double, 2> pixel_of(const CameraRays& rays, const Vec3& p)
     return {x / t, y / t};
 }
 
-Picture over_white(const Frame& frame)
-{
-    Frame opaque;
-    opaque.width = frame.width;
-    opaque.height = frame.height;
-    opaque.rgba = frame.rgba;
-    composite_over(opaque, {1, 1, 1});
-    return to_picture(opaque);
-}
-
 /// The distance in pixels from the hit at pixel i of `frame` to the border of its face; 0 for a miss.
 double border_distance_px(const PackImage& image, const TrimReference& reference, const CameraRays& rays,
                           const Frame& frame, size_t i)
@@ -96,22 +85,6 @@ double border_distance_px(const PackImage& image, const TrimReference& reference
 }
 
 } // namespace
-
-double psnr_db(const Picture& a, const Picture& b)
-{
-    assert(a.width == b.width && a.height == b.height && a.rgba.size() == b.rgba.size() && !a.rgba.empty());
-    uint64_t squares = 0;
-    for (size_t i = 0; i < a.rgba.size(); ++i) {
-        if (i % 4 == 3)
-            continue;
-        const int difference = int(a.rgba[i]) - int(b.rgba[i]);
-        squares += static_cast<uint64_t>(difference * difference);
-    }
-    if (squares == 0)
-        return std::numeric_limits<double>::infinity();
-    const double mse = static_cast<double>(squares) / (0.75 * static_cast<double>(a.rgba.size()));
-    return 10 * std::log10(255.0 * 255.0 / mse);
-}
 
 PixelOfFace pixel_of_face(const PackImage& image, const CameraRays& rays, uint instance, uint face, double u, double v)
 {

@@ -4,18 +4,13 @@
 
 #include "format/trim_reference.h"
 #include "runtime/camera.h"
-#include "runtime/image_io.h"
+#include "runtime/psnr.h"
 #include "runtime/tracer.h"
 
 #include <array>
 #include <cstdint>
 
 namespace trimray {
-
-/// 10 log10(255^2 / MSE) in dB, the mean over all pixels and the channels R, G and B of the pictures as they go to a
-/// screen; infinity for equal ones. Alpha is not compared: put the frames over a background first.
-/// Domain: equal sizes, at least one pixel.
-double psnr_db(const Picture& a, const Picture& b);
 
 struct TrimErrors {
     double psnr_db = 0; // over white

@@ -6,6 +6,7 @@ FOLDER holds trimray and, where the converter is built, trimray-pack; without it
 
 import argparse
 import json
+import math
 import os
 import resource
 import shutil
@@ -553,8 +554,34 @@ class Bench(CliTest):
         self.assertRegex(text, r"(?m)^sdf curve isotropic 100 % +\d+ ")
         self.assertIn("--eye", text)
 
+    def test_closest_measures_both_policies_against_the_reference(self):
+        report = self.json_of("bench", "closest", PACK, "--json", "--size", "48x36", "--rounds", 2, "--frames", "3,1",
+                              "--views", "front,iso")
+        self.assertEqual((report["width"], report["height"], report["rounds"], report["threads"]), (48, 36, 2, 1))
+        [measured] = report["packs"]
+        self.assertLessEqual(measured["bezier_patches"], measured["bezier_leaves"])
+        self.assertEqual([view["view"] for view in measured["views"]], ["front", "iso"])
+        costs = [view["certified_cost"] for view in measured["views"]]
+        self.assertAlmostEqual(report["certified_cost"], math.sqrt(costs[0] * costs[1]))
+        for view in measured["views"]:
+            self.assertEqual([(row["closest"], row["leaves"], row["frames"]) for row in view["settings"]],
+                             [("stochastic", "one", 1), ("stochastic", "one", 3), ("stochastic", "pack", 1),
+                              ("stochastic", "pack", 3), ("certified", "pack", 1)])
+            for row in view["settings"]:
+                self.assertGreater(row["frame_ms"], 0)
+                wrong = row["missing"] + row["extra"] + row["wrong_depth"]
+                self.assertAlmostEqual(row["wrong_per_million"], wrong / (48 * 36) * 1e6)
+                self.assertTrue(row["psnr_db"] is None or row["psnr_db"] > 40, row)
+            self.assertEqual(view["settings"][-1]["wrong_per_million"], 0)
+        text = self.ok("bench", "closest", PACK, "--size", "32x24", "--rounds", 1, "--frames", 1, "--views", "iso").stdout
+        self.assertRegex(text, r"(?m)^stochastic +one +1 ")
+        self.assertRegex(text, r"Certified frames cost [\d.]+ of")
+
     def test_errors_have_their_exit_codes(self):
         self.fails(1, "bench", says=["bench", "subcommand"])
+        self.fails(1, "bench", "closest", says=["bench closest", "PACK"])
+        self.fails(1, "bench", "closest", PACK, "--frames", "0", says=["--frames"])
+        self.fails(1, "bench", "closest", PACK, "--views", "frnt", says=["--views", "frnt"])
         self.fails(1, "bench", "trims", says=["bench trims", "PACK", "trimray bench trims --help"])
         self.fails(1, "bench", "trims", PACK, "--rouns", "3", says=["bench trims", "did you mean '--rounds'?"])
         self.fails(1, "bench", "trims", PACK, "--views", "iso,frnt", says=["--views", "frnt", "close-up"])

@@ -1,0 +1,90 @@
+#include "runtime/closest_errors.h"
+
+#include "runtime/psnr.h"
+
+#include <algorithm>
+#include <cmath>
+#include <tbb/parallel_for.h>
+#include <utility>
+
+namespace trimray {
+namespace {
+
+using reference::length;
+using reference::operator*;
+using reference::operator+;
+
+constexpr double kHairPx = 1e-3;
+
+reference::Ray pixel_ray(const CameraRays& rays, uint32_t x, uint32_t y)
+{
+    return {rays.eye, rays.corner + rays.step_x * (x + 0.5) + rays.step_y * (y + 0.5)};
+}
+
+} // namespace
+
+Result<ReferencePicture> ReferencePicture::make(std::shared_ptr<const Scene> scene, const RenderOptions& options)
+{
+    RenderOptions traced = options;
+    traced.closest = ClosestPolicy::Certified;
+    traced.trim = TrimMode::Exact;
+    traced.threads = 0;
+    traced.frames = 1;
+    RenderStats stats;
+    const Result<Frame> frame = make_reference_tracer(scene)->render(traced, stats);
+    if (!frame.ok())
+        return frame.error();
+    return ReferencePicture(std::move(scene), options, *frame);
+}
+
+ReferencePicture::ReferencePicture(std::shared_ptr<const Scene> scene, const RenderOptions& options, const Frame& frame)
+    : scene_(std::move(scene)), closest_(scene_->pack.image),
+      rays_(camera_rays(options.camera, options.width, options.height)), width_(options.width), height_(options.height),
+      picture_(over_white(frame)), depth_mm_(frame.depth_mm), asked_(frame.depth_mm.size(), Asked::No)
+{
+}
+
+bool ReferencePicture::is_tangent(uint32_t x, uint32_t y)
+{
+    Asked& asked = asked_[size_t{y} * width_ + x];
+    if (asked == Asked::No) {
+        const reference::Ray ray = pixel_ray(rays_, x, y);
+        const Doubt doubt = closest_.hair(ray, closest_.closest(ray), rays_.step_x, rays_.step_y, kHairPx).doubt;
+        asked = doubt == Doubt::Tangent ? Asked::Tangent : Asked::Sure;
+    }
+    return asked == Asked::Tangent;
+}
+
+ClosestErrors ReferencePicture::errors(const Frame& frame)
+{
+    std::vector<ClosestErrors> rows(height_);
+    tbb::parallel_for(0u, height_, [&](uint32_t y) {
+        ClosestErrors& row = rows[y];
+        for (uint32_t x = 0; x < width_; ++x) {
+            const size_t i = size_t{y} * width_ + x;
+            const double right = double(depth_mm_[i]), traced = double(frame.depth_mm[i]);
+            const bool hits = std::isfinite(right), traced_hits = std::isfinite(traced);
+            const double per_mm = length(pixel_ray(rays_, x, y).direction) /
+                                  std::max(length(rays_.step_x), length(rays_.step_y)); // 1 / a pixel's angle
+            const bool apart = hits && traced_hits && std::abs(traced - right) * per_mm > kWrongDepth * right;
+            if (hits == traced_hits && !apart)
+                continue;
+            if (is_tangent(x, y))
+                ++row.tangent;
+            else
+                ++(apart ? row.wrong_depth : hits ? row.missing : row.extra);
+        }
+    });
+    ClosestErrors sum;
+    for (const ClosestErrors& row : rows) {
+        sum.missing += row.missing;
+        sum.extra += row.extra;
+        sum.wrong_depth += row.wrong_depth;
+        sum.tangent += row.tangent;
+    }
+    sum.pixels = uint64_t{width_} * height_;
+    sum.psnr_db = psnr_db(over_white(frame), picture_);
+    return sum;
+}
+
+} // namespace trimray

@@ -1,0 +1,52 @@
+// How far a picture is from that of the reference for closest hits: in decibels, and in pixels that show something
+// else.
+#pragma once
+
+#include "format/closest_reference.h"
+#include "runtime/camera.h"
+#include "runtime/image_io.h"
+#include "runtime/tracer.h"
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+namespace trimray {
+
+struct ClosestErrors {
+    double psnr_db = 0; // over white
+    uint64_t pixels = 0;
+    // of pixels whose answer stays where their ray moves by 1e-3 pixels
+    uint64_t missing = 0, extra = 0;
+    uint64_t wrong_depth = 0; // both hit, more than kWrongDepth apart
+    uint64_t tangent = 0;     // any of these, but such a move changes the reference's answer
+    uint64_t wrong() const { return missing + extra + wrong_depth; }
+};
+constexpr double kWrongDepth = 0.1; // footprints: distance times the angle of a pixel
+
+/// The reference's picture of one view, made once, and its own doubts about pixels, which are asked for as they come
+/// and remembered.
+class ReferencePicture {
+public:
+    /// `options` say camera and size; the picture is certified, with exact trims. Fails: as Tracer::render.
+    static Result<ReferencePicture> make(std::shared_ptr<const Scene> scene, const RenderOptions& options);
+
+    /// Compares a frame of the same view and size, on all cores.
+    ClosestErrors errors(const Frame& frame);
+
+private:
+    ReferencePicture(std::shared_ptr<const Scene> scene, const RenderOptions& options, const Frame& frame);
+
+    bool is_tangent(uint32_t x, uint32_t y);
+
+    enum class Asked : uint8_t { No, Sure, Tangent };
+    std::shared_ptr<const Scene> scene_; // before what refers to it
+    ClosestReference closest_;
+    CameraRays rays_;
+    uint32_t width_, height_;
+    Picture picture_; // over white
+    std::vector<float> depth_mm_;
+    std::vector<Asked> asked_;
+};
+
+} // namespace trimray
