@@ -1,5 +1,6 @@
 // trimray-pack: a CAD file in, a scene pack out. The work runs in a child process with limits on time and memory, since
 // damaged files make the CAD kernel crash or hang; this process parses, waits and reports.
+#include "format/pack_file.h"
 #include "format/pack_writer.h"
 #include "format/result.h"
 #include "preprocess/build_pack.h"
@@ -44,6 +45,7 @@ constexpr const char* kFooter =
     "\nExamples:\n"
     "  trimray-pack engine.step -o engine.tray\n"
     "  trimray-pack engine.step.zst -o engine.tray --trim-memory 100% --json\n"
+    "  trimray-pack engine.step -o papers.tray --surfaces bezier --leaf-budget 1\n"
     "  trimray-pack board.stp -o board.tray --compact --timeout 600 --memory-limit 4GiB\n"
     "\nExit codes: 0 done, 1 usage, 2 file not read or written, 3 invalid input, 4 unsupported, 5 internal,\n"
     "6 done but some faces were dropped (and named).";
@@ -116,6 +118,10 @@ Result<std::optional<Options>> parse_options(int argc, char** argv)
     app.add_option("--trim-layout", layout, "Texels with equal sides on the surface, or the paper's square textures")
         ->check(CLI::IsMember({"isotropic", "square"}))
         ->capture_default_str();
+    app.add_option("--leaf-budget", options.build.leaves.max_leaves_per_patch,
+                   "Leaves of a Bezier patch at most; 1 is the paper's setting")
+        ->check(CLI::Range(1u, kMaxLeavesPerPatch))
+        ->capture_default_str();
     app.add_flag("--compact", options.build.compact,
                  "Leave out what can be built again at load, the larger preview and the coarse triangles");
     app.add_flag("--heal", options.import.heal, "Run the CAD kernel's full shape healing (slow)");
@@ -164,6 +170,7 @@ std::string provenance_options(const Options& options)
         json["trim_memory_fraction"] = options.build.trim_memory_fraction;
     json["trim_source"] = options.build.trim_textures.source == TrimSource::Mask ? "mask" : "curve";
     json["trim_layout"] = options.build.trim_textures.layout == TrimLayout::Square ? "square" : "isotropic";
+    json["leaf_budget"] = options.build.leaves.max_leaves_per_patch;
     json["compact"] = options.build.compact;
     return json.dump();
 }

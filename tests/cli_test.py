@@ -609,6 +609,19 @@ class Pack(CliTest):
         text = self.ok("pack", MODEL, "-o", WORK / "again.tray").stdout
         self.assertRegex(text, r"\ntrims +pcurves within \S+ mm of their edges, \d+ beyond an edge's tolerance, \d+ rebuilt")
 
+    def test_patches_have_no_more_leaves_than_they_may(self):
+        leaves = {}
+        for budget in ["1", "1024"]:
+            out = WORK / "leaves.tray"
+            self.ok("pack", MODEL, "-o", out, "--surfaces", "bezier", "--leaf-budget", budget, "--no-previews")
+            info = self.json_of("info", out, "--json")
+            leaves[budget] = info["leaves"]
+            if budget == "1":
+                self.assertEqual(info["leaves"], info["patches"])
+        self.assertGreater(leaves["1024"], leaves["1"])
+        for budget in ["0", "4097", "one"]:
+            self.fails(1, "pack", MODEL, "-o", WORK / "x.tray", "--leaf-budget", budget, says=["--leaf-budget"])
+
     def test_the_same_model_gives_the_same_bytes(self):
         self.ok("pack", MODEL, "-o", WORK / "same.tray")
         self.assertEqual(PACK.read_bytes(), (WORK / "same.tray").read_bytes())

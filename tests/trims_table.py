@@ -13,80 +13,25 @@ Means over models and views: geometric for speeds, times and bytes, arithmetic f
 that equals the reference's counts as 100 dB.
 """
 
-import argparse
-import json
-import math
-import pathlib
-import subprocess
 import sys
-import tempfile
 
-MODEL_ENDINGS = {".step", ".stp", ".igs", ".iges", ".brep"}
-EQUAL_DB = 100.0  # more than any picture that differs in one pixel by one level: 8 million pixels would reach 117
+from bench_tables import arguments, decibels, geometric, mean, reports, run_json, shown, table
+
 PAPER, OURS = ("mask", "square"), ("curve", "isotropic")
 GOALS = {"speed": 1.6, "to_sdf": 0.97, "wrong": 1.0, "decibels": 6.0, "edges": 5.0}
 
 
-def plain_name(path):
-    return path.name[:-4] if path.suffix == ".zst" else path.name
-
-
-def is_input(path):
-    return path.is_file() and pathlib.Path(plain_name(path)).suffix.lower() in MODEL_ENDINGS | {".tray"}
-
-
-def inputs(arguments):
-    found = []
-    for path in arguments:
-        found += sorted(p for p in path.rglob("*") if is_input(p)) if path.is_dir() else [path]
-    return found
-
-
-def run_json(command):
-    done = subprocess.run([str(c) for c in command], capture_output=True, text=True, check=False)
-    if done.returncode not in (0, 6):
-        raise RuntimeError((done.stderr.strip().splitlines() or ["no message"])[-1])
-    return json.loads(done.stdout)
-
-
-def measure(path, options):
-    """The report of one model: that of `bench trims` for its pack, with the model's name and face counts."""
+def measure(pack, options):
+    """What `bench trims` says of a pack, with its face counts."""
     tools = options.build / "bin"
-    with tempfile.TemporaryDirectory() as folder:
-        model = path
-        if path.suffix == ".zst":
-            model = pathlib.Path(folder) / plain_name(path)
-            subprocess.run(["zstd", "-d", "-q", path, "-o", model], check=True)
-        pack = model
-        if model.suffix != ".tray":
-            pack = pathlib.Path(folder) / "model.tray"
-            run_json([tools / "trimray-pack", model, "-o", pack, "--no-previews", "--json"])
-        info = run_json([tools / "trimray", "info", pack, "--json"])
-        report = run_json([tools / "trimray", "bench", "trims", pack, "--json", "--size", options.size, "--rounds",
-                           options.rounds, "--threads", options.threads])
-    return {"model": path.name.removesuffix(".zst"), "faces": info["faces"],
+    info = run_json([tools / "trimray", "info", pack, "--json"])
+    report = run_json([tools / "trimray", "bench", "trims", pack, "--json", "--size", options.size, "--rounds",
+                       options.rounds, "--threads", options.threads])
+    return {"faces": info["faces"],
             "trimmed": next((int(e["why"].split()[0].replace(",", "")) for e in info["effects"]
                              if e["name"].startswith("trim-")), 0),
             "width": report["width"], "height": report["height"], "rounds": report["rounds"],
             "threads": report["threads"], "device": report["device"], "views": report["packs"][0]["views"]}
-
-
-def geometric(values):
-    values = list(values)
-    return math.exp(sum(math.log(v) for v in values) / len(values)) if values else math.nan
-
-
-def mean(values):
-    values = list(values)
-    return sum(values) / len(values) if values else math.nan
-
-
-def decibels(row):
-    return EQUAL_DB if row["psnr_db"] is None else min(row["psnr_db"], EQUAL_DB)
-
-
-def shown(db):
-    return "equal" if db >= EQUAL_DB else f"{db:.1f}"
 
 
 def wrong_rays(rows):
@@ -113,13 +58,6 @@ class Reports:
 
 def setting_name(mode, textures, percent):
     return mode if percent is None else f"{mode} {textures[0]}/{textures[1]} {percent:g} %"
-
-
-def table(header, rows):
-    print("| " + " | ".join(header) + " |\n|" + "---|" * len(header))
-    for row in rows:
-        print("| " + " | ".join(row) + " |")
-    print()
 
 
 def print_settings(all_of, settings):
@@ -191,38 +129,13 @@ def print_goals(all_of):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("inputs", nargs="+", type=pathlib.Path)
-    parser.add_argument("-o", "--output", type=pathlib.Path, default=pathlib.Path("trims.jsonl"))
-    parser.add_argument("--build", type=pathlib.Path, default=pathlib.Path(__file__).resolve().parent.parent / "build")
-    parser.add_argument("--size", default="1920x1080")
-    parser.add_argument("--rounds", type=int, default=5)
-    parser.add_argument("--threads", type=int, default=1)
-    options = parser.parse_args()
-
-    done = {}
-    if options.output.exists():
-        done = {report["model"]: report for report in map(json.loads, options.output.read_text().splitlines())}
-    reports = []
-    with open(options.output, "a", encoding="utf-8") as output:
-        for path in inputs(options.inputs):
-            name = path.name.removesuffix(".zst")
-            if name not in done:
-                print(f"{name} ...", file=sys.stderr, flush=True)
-                try:
-                    done[name] = measure(path, options)
-                except (RuntimeError, OSError) as failure:
-                    print(f"{name}: {failure}", file=sys.stderr)
-                    continue
-                output.write(json.dumps(done[name]) + "\n")
-                output.flush()
-            reports.append(done[name])
-    if not reports:
+    found = reports(arguments(__doc__.splitlines()[0], "trims.jsonl", "1920x1080", 5), measure)
+    if not found:
         return 1
-    first = reports[0]
-    print(f"{len(reports)} models, {sum(len(r['views']) for r in reports)} views at {first['width']}x{first['height']}, "
+    first = found[0]
+    print(f"{len(found)} models, {sum(len(r['views']) for r in found)} views at {first['width']}x{first['height']}, "
           f"{first['threads']} thread(s), {first['device']}, medians of {first['rounds']} rounds\n")
-    all_of = Reports(reports)
+    all_of = Reports(found)
     every = all_of.settings()
     print("## README\n")
     print_settings(all_of, [s for s in every if s[0] in ("kd", "exact") or s == ("hybrid", OURS, 100)
