@@ -1,6 +1,7 @@
 // A scene's pictures by both tracers, scored against the reference for closest hits in the units of the hard cases.
 #pragma once
 
+#include "runtime/leaf_budget.h"
 #include "tests/against_reference.h"
 #include "tests/keep_vulkan_loaded.h"
 
@@ -8,6 +9,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdlib>
 #include <functional>
 #include <iostream>
 #include <memory>
@@ -100,6 +102,34 @@ inline Score score(Tracer& tracer, const ClosestReference& closest, const std::v
     return s;
 }
 
+/// Ours switched to plain: the first stochastic frame, Newton once from the middle of each leaf, with one leaf a patch.
+class PlainTracer final : public Tracer {
+public:
+    explicit PlainTracer(const Scene& scene)
+    {
+        Result<std::unique_ptr<Tracer>> made = make_cpu_tracer(with_leaf_budget(scene, 1));
+        tracer_ = std::move(*made); // the scene was traced already
+    }
+
+    std::string device_name() const override { return "plain"; }
+
+    Result<Frame> render(const RenderOptions& options, RenderStats& stats) override
+    {
+        RenderOptions plain = options;
+        plain.closest = ClosestPolicy::Stochastic;
+        return tracer_->render(plain, stats);
+    }
+
+private:
+    std::unique_ptr<Tracer> tracer_;
+};
+
+/// Whether the plain tracer's figures are to be printed beside ours: TRIMRAY_PLAIN is set.
+inline bool plain_asked()
+{
+    return std::getenv("TRIMRAY_PLAIN") != nullptr;
+}
+
 /// Hands over the score of a tracer and prints it; expects no NaN and no open search. Vulkan, whose driver may be
 /// software, makes pictures with sides a quarter as long; without a driver it is named as skipped.
 inline void on_tracer(bool vulkan, const std::shared_ptr<const Scene>& scene, const std::vector<View>& views,
@@ -113,7 +143,14 @@ inline void on_tracer(bool vulkan, const std::shared_ptr<const Scene>& scene, co
         return;
     }
     ASSERT_TRUE(tracer.ok()) << tracer.error().where << ": " << tracer.error().detail;
-    Score s = score(**tracer, ClosestReference(scene->pack.image), views, vulkan ? 4 : 1);
+    const ClosestReference closest(scene->pack.image);
+    if (plain_asked() && !vulkan) {
+        PlainTracer plain(*scene);
+        Score s = score(plain, closest, views, 1);
+        s.tracer = plain.device_name();
+        std::cout << s << "\n";
+    }
+    Score s = score(**tracer, closest, views, vulkan ? 4 : 1);
     s.tracer = vulkan ? "vulkan" : "cpu";
     std::cout << s << "\n";
     EXPECT_EQ(s.not_finite, 0u) << s;
