@@ -17,7 +17,6 @@ import sys
 from bench_tables import arguments, decibels, geometric, mean, reports, run_json, shown, table
 
 GOALS = {"decibels": 70.0, "cost": 1.15}
-STOCHASTIC = [("stochastic", "one"), ("stochastic", "pack")]
 
 
 def measure(pack, options):
@@ -41,11 +40,8 @@ def wrong(some):
     return f"{mean(row['wrong_per_million'] for row in some):,.1f}"
 
 
-def cells(found, closest, leaves, frames):
-    """Decibels, wrong pixels a million and milliseconds of pictures made of so many frames."""
-    some = [rows(found, closest, leaves, n) for n in frames]
-    return [" / ".join(shown(mean(decibels(row) for row in of)) for of in some), " / ".join(wrong(of) for of in some),
-            f"{geometric(row['frame_ms'] for row in some[-1]):.1f}"]
+def all_decibels(some):
+    return shown(mean(decibels(row) for row in some))
 
 
 def cost(found):
@@ -54,21 +50,21 @@ def cost(found):
 
 def print_models(found):
     frames = frames_of(found)
+    table_rows = []
+    for report in found:
+        row = [report["model"], f"{report['bezier_patches']:,} / {report['bezier_leaves']:,}"]
+        first, certified = [], rows([report], "certified", "pack", 1)
+        for leaves in ("one", "pack"):
+            pictures = [rows([report], "stochastic", leaves, n) for n in frames]
+            row += [" / ".join(map(all_decibels, pictures)), " / ".join(wrong(pictures[i]) for i in (0, -1))]
+            first.append(f"{geometric(r['frame_ms'] for r in pictures[0]):.1f}")
+        ms = [*first, f"{geometric(r['frame_ms'] for r in certified):.1f}"]
+        table_rows.append([*row, all_decibels(certified), wrong(certified), " / ".join(ms), f"{cost([report]):.2f}"])
     made_of = "frames " + " / ".join(map(str, frames))
-    for closest, leaves, title in [(*STOCHASTIC[0], "Stochastic, one leaf a patch"),
-                                   (*STOCHASTIC[1], "Stochastic, our leaves")]:
-        print(f"{title}:\n")
-        table(["model", "Bézier patches", "leaves", f"PSNR, dB, {made_of}", f"wrong pixels a million, {made_of}", "ms a frame"],
-              [[report["model"], f"{report['bezier_patches']:,}",
-                f"{report['bezier_patches' if leaves == 'one' else 'bezier_leaves']:,}",
-                *cells([report], closest, leaves, frames)] for report in found])
-    print("Certified, one frame, our leaves:\n")
-    table(["model", "PSNR, dB", "worst view", "wrong pixels a million", "tangent", "ms", "× a stochastic frame"],
-          [[report["model"], cells([report], "certified", "pack", [1])[0],
-            shown(min(map(decibels, rows([report], "certified", "pack", 1)))),
-            wrong(rows([report], "certified", "pack", 1)),
-            f"{mean(1e6 * row['tangent'] / (report['width'] * report['height']) for row in rows([report], 'certified', 'pack', 1)):,.1f}",
-            cells([report], "certified", "pack", [1])[2], f"{cost([report]):.2f}"] for report in found])
+    wrong_of = f"wrong pixels a million, frames {frames[0]} / {frames[-1]}"
+    table(["model", "Bézier patches / leaves", f"one leaf a patch: PSNR, dB, {made_of}", wrong_of,
+           f"our leaves: PSNR, dB, {made_of}", wrong_of, "certified: PSNR, dB", "wrong pixels a million",
+           "ms: one leaf / our leaves / certified", "certified × stochastic frame"], table_rows)
 
 
 def print_goals(found):
