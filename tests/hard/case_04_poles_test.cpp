@@ -66,48 +66,64 @@ struct Found {
     double normal_deg = 0; // largest error of the direction, either way
 };
 
-/// Pictures of 48 x 48 pixels, `half` part units from their middle, the pole, to their sides.
-Found look_at_pole(Tracer& tracer, const Model& model, const ClosestReference& closest, double half)
+/// What the reference says of pictures of 48 x 48 pixels, `half` part units from their middle, the pole, to their
+/// sides.
+struct PoleView {
+    RenderOptions options;
+    std::vector<ReferenceHit> hits; // of each pixel
+};
+
+std::vector<PoleView> views_of_pole(const Model& model, const ClosestReference& closest, double half)
 {
     constexpr uint32_t kSide = 48;
     const double up = model.pole_z < 0 ? -1 : 1, distance = 30;
-    Found found;
+    std::vector<PoleView> views;
     for (const double slant : {0.0, 0.4}) {
-        RenderOptions options;
-        options.width = options.height = kSide;
+        PoleView& view = views.emplace_back();
+        RenderOptions& options = view.options;
+        options.width = options.height = kSide / shrinking(false);
         options.camera.target = {0, 0, model.pole_z * kUnit_mm};
         options.camera.eye = {distance * std::sin(slant) * 0.8, distance * std::sin(slant) * 0.6,
                               model.pole_z * kUnit_mm + up * distance * std::cos(slant)};
         options.camera.up = {0, 1, 0};
         options.camera.fov_deg = 360 / kPi * std::atan(half * kUnit_mm / distance);
         options.shade = false;
+        const CameraRays rays = camera_rays(options.camera, options.width, options.height);
+        using reference::operator+;
+        using reference::operator*;
+        for (uint32_t y = 0; y < options.height; ++y)
+            for (uint32_t x = 0; x < options.width; ++x)
+                view.hits.push_back(
+                    closest.closest({rays.eye, rays.corner + rays.step_x * (x + 0.5) + rays.step_y * (y + 0.5)}));
+    }
+    return views;
+}
+
+Found look_at_pole(Tracer& tracer, const std::vector<PoleView>& views)
+{
+    Found found;
+    for (const PoleView& view : views) {
         RenderStats stats;
-        const Result<Frame> frame = tracer.render(options, stats);
+        const Result<Frame> frame = tracer.render(view.options, stats);
         if (!frame.ok()) {
             ADD_FAILURE() << frame.error().detail;
             return found;
         }
-        const CameraRays rays = camera_rays(options.camera, kSide, kSide);
-        using reference::operator+;
-        using reference::operator*;
-        for (uint32_t y = 0; y < kSide; ++y)
-            for (uint32_t x = 0; x < kSide; ++x) {
-                const size_t i = size_t(y) * kSide + x;
-                const ReferenceHit hit =
-                    closest.closest({rays.eye, rays.corner + rays.step_x * (x + 0.5) + rays.step_y * (y + 0.5)});
-                ++found.rays;
-                found.false_misses += hit.hit && frame->face[i] < 0;
-                if (!hit.hit || frame->face[i] < 0)
-                    continue;
-                found.not_finite += !std::isfinite(frame->depth_mm[i]);
-                const reference::Vec3 n{frame->normal[3 * i], frame->normal[3 * i + 1], frame->normal[3 * i + 2]};
-                found.not_finite += !std::isfinite(reference::dot(n, n));
-                const double along = reference::dot(n, hit.normal);
-                found.turned += along < 0;
-                found.normal_deg = std::max(
-                    found.normal_deg,
-                    180 / kPi * std::atan2(reference::length(reference::cross(n, hit.normal)), std::abs(along)));
-            }
+        for (size_t i = 0; i < view.hits.size(); ++i) {
+            const ReferenceHit& hit = view.hits[i];
+            ++found.rays;
+            found.false_misses += hit.hit && frame->face[i] < 0;
+            if (!hit.hit || frame->face[i] < 0)
+                continue;
+            found.not_finite += !std::isfinite(frame->depth_mm[i]);
+            const reference::Vec3 n{frame->normal[3 * i], frame->normal[3 * i + 1], frame->normal[3 * i + 2]};
+            found.not_finite += !std::isfinite(reference::dot(n, n));
+            const double along = reference::dot(n, hit.normal);
+            found.turned += along < 0;
+            found.normal_deg =
+                std::max(found.normal_deg,
+                         180 / kPi * std::atan2(reference::length(reference::cross(n, hit.normal)), std::abs(along)));
+        }
     }
     return found;
 }
@@ -117,6 +133,9 @@ TEST(case_04, poles_are_hit_and_smooth_ones_keep_their_normal)
     keep_vulkan_loaded();
     for (const Model& model : models()) {
         const ClosestReference closest(model.scene->pack.image);
+        std::array<std::vector<PoleView>, kHalves.size()> views;
+        for (size_t k = 0; k < kHalves.size(); ++k)
+            views[k] = views_of_pole(model, closest, kHalves[k]);
         for (const bool vulkan : {false, true}) {
             auto tracer = vulkan ? make_vulkan_tracer(model.scene, true, false) : make_cpu_tracer(model.scene);
             if (!tracer.ok()) {
@@ -124,7 +143,7 @@ TEST(case_04, poles_are_hit_and_smooth_ones_keep_their_normal)
                 continue;
             }
             for (size_t k = 0; k < kHalves.size(); ++k) {
-                const Found found = look_at_pole(**tracer, model, closest, kHalves[k]);
+                const Found found = look_at_pole(**tracer, views[k]);
                 std::cout << model.name << (vulkan ? ", vulkan" : ", cpu") << ", " << kHalves[k]
                           << " from the pole: normals within " << found.normal_deg << " deg, " << found.turned
                           << " turned, " << found.false_misses << " false misses, " << found.not_finite

@@ -96,8 +96,10 @@ TEST(case_21, a_hole_across_the_seam_looks_the_same_at_sixteen_turns)
         ASSERT_TRUE(scene) << turn;
         ASSERT_TRUE(scene->pack.image.dropped.empty()) << turn;
         const TrimReference reference(scene->pack.image);
+        // the hole reaches 23.6 degrees from the x axis: the seam in its middle, at its sides, and opposite
+        const bool on_vulkan = turn == 0 || turn == 1 || turn == 8 || turn == 15;
         for (const bool vulkan : {false, true}) {
-            const auto tracer = tracer_of(scene, vulkan);
+            const auto tracer = !vulkan || on_vulkan ? tracer_of(scene, vulkan) : nullptr;
             if (!tracer)
                 continue;
             const Frame exact = picture(*tracer, options_of(at_the_hole, {"", vulkan, TrimMode::Exact}));

@@ -130,8 +130,19 @@ inline bool plain_asked()
     return std::getenv("TRIMRAY_PLAIN") != nullptr;
 }
 
-/// Hands over the score of a tracer and prints it; expects no NaN and no open search. Vulkan, whose driver may be
-/// software, makes pictures with sides a quarter as long; without a driver it is named as skipped.
+/// What a picture's sides are divided by. Vulkan's driver may be software; and sanitizers, which slow the reference by
+/// ten, look for other faults than a picture's.
+inline uint32_t shrinking(bool vulkan)
+{
+#ifdef __SANITIZE_ADDRESS__
+    return vulkan ? 8 : 4;
+#else
+    return vulkan ? 4 : 1;
+#endif
+}
+
+/// Hands over the score of a tracer and prints it; expects no NaN and no open search. Sides are `shrinking` times
+/// shorter; without a Vulkan driver that tracer is named as skipped.
 inline void on_tracer(bool vulkan, const std::shared_ptr<const Scene>& scene, const std::vector<View>& views,
                       const std::function<void(const Score&)>& check)
 {
@@ -146,11 +157,11 @@ inline void on_tracer(bool vulkan, const std::shared_ptr<const Scene>& scene, co
     const ClosestReference closest(scene->pack.image);
     if (plain_asked() && !vulkan) {
         PlainTracer plain(*scene);
-        Score s = score(plain, closest, views, 1);
+        Score s = score(plain, closest, views, shrinking(false));
         s.tracer = plain.device_name();
         std::cout << s << "\n";
     }
-    Score s = score(**tracer, closest, views, vulkan ? 4 : 1);
+    Score s = score(**tracer, closest, views, shrinking(vulkan));
     s.tracer = vulkan ? "vulkan" : "cpu";
     std::cout << s << "\n";
     EXPECT_EQ(s.not_finite, 0u) << s;
