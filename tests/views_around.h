@@ -49,7 +49,7 @@ public:
         return camera;
     }
 
-    /// From beside a surface that a picture shows, 1e-4 to 0.3 of the model's size from it, to anywhere.
+    /// From beside a surface that a picture shows, 1e-3 to 0.3 of the model's size from it, to anywhere.
     std::optional<Camera> within(const Frame& frame, const Camera& of)
     {
         using reference::operator+;
@@ -59,7 +59,7 @@ public:
             return {};
         Camera camera;
         camera.fov_deg = 80;
-        camera.eye = *at + direction() * (radius_ * std::pow(10, uniform(-4, -0.5)));
+        camera.eye = *at + direction() * (radius_ * std::pow(10, uniform(-3, -0.5)));
         camera.target = camera.eye + direction();
         return camera;
     }

@@ -18,15 +18,33 @@
 
 namespace trimray::hard {
 
+/// What a pixel that differs from the reference's is counted as.
+enum class Verdict {
+    Tangent, // moving the ray by 1e-3 pixels decides it
+    Slack,   // missed where the reference has a hit within kDomainSlack outside of a face's domain
+    WrongFace,
+    FalseMiss, // or a hit that lies behind the true one
+    FalseHit,  // or one before it
+};
+
+inline Verdict verdict_of(const FaultyPixel& pixel)
+{
+    const bool of_face = pixel.fault == Fault::WrongFace;
+    if (of_face ? pixel.doubt != Doubt::None : pixel.doubt == Doubt::Tangent)
+        return Verdict::Tangent;
+    if (of_face)
+        return Verdict::WrongFace;
+    const bool behind = pixel.fault == Fault::FalseMiss || pixel.tracer_mm > pixel.reference_mm;
+    const auto [u, v] = pixel.reference_uv_face; // clamped to the domain
+    const bool outside = std::min(u, v) <= 0 || std::max(u, v) >= double(kUvBelowOne);
+    return !behind ? Verdict::FalseHit : outside ? Verdict::Slack : Verdict::FalseMiss;
+}
+
 /// Of pictures that one tracer made.
 struct Score {
     std::string tracer; // "cpu" or "vulkan"
     uint64_t rays = 0, hits = 0;
-    // of rays that the reference is sure of: those that stay what they are where they move by 1e-3 pixels. A hit that
-    // lies behind the true one is a false miss too, one before it a false hit
-    uint64_t false_misses = 0, false_hits = 0, wrong_faces = 0;
-    uint64_t tangent = 0;    // wrong, but such a move decides them
-    uint64_t slack = 0;      // missed where the reference has a hit within kDomainSlack outside of a face's domain
+    uint64_t false_misses = 0, false_hits = 0, wrong_faces = 0, tangent = 0, slack = 0; // Verdict
     double farthest_px = 0;  // the least of 1e-3, 1e-2, 0.1 and 1 pixels within which every wrong ray's answer changes
     uint64_t not_finite = 0; // NaN, or an infinity other than a miss's depth
     uint64_t open = 0;       // rays of which the reference itself is not sure
@@ -76,16 +94,14 @@ inline Score score(Tracer& tracer, const ClosestReference& closest, const std::v
         s.rays += a.rays;
         s.hits += a.both_hit;
         for (const FaultyPixel& pixel : a.pixels) {
-            const bool of_face = pixel.fault == Fault::WrongFace;
-            const bool decided_by_a_hair = of_face ? pixel.doubt != Doubt::None : pixel.doubt == Doubt::Tangent;
-            const bool behind = pixel.fault == Fault::FalseMiss || pixel.tracer_mm > pixel.reference_mm;
-            const auto [u, v] = pixel.reference_uv_face; // clamped to the domain
-            const bool outside = std::min(u, v) <= 0 || std::max(u, v) >= double(kUvBelowOne);
-            if (!decided_by_a_hair && !of_face && behind && outside) {
-                ++s.slack;
+            const Verdict verdict = verdict_of(pixel);
+            ++(verdict == Verdict::Tangent     ? s.tangent
+               : verdict == Verdict::Slack     ? s.slack
+               : verdict == Verdict::WrongFace ? s.wrong_faces
+               : verdict == Verdict::FalseMiss ? s.false_misses
+                                               : s.false_hits);
+            if (verdict == Verdict::Slack)
                 continue;
-            }
-            ++(decided_by_a_hair ? s.tangent : of_face ? s.wrong_faces : behind ? s.false_misses : s.false_hits);
             s.farthest_px = std::max(s.farthest_px, pixel.hair_px);
         }
         s.not_finite += a.not_finite;
