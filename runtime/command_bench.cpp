@@ -164,6 +164,24 @@ void end_progress()
         fmt::print(stderr, "\r\033[K");
 }
 
+/// Benches one pack after the other; `take` gets each report. The exit code: that of the first pack that failed, which
+/// is reported, or kExitOk.
+template <class Bench, class Take>
+int bench_each(const std::vector<std::string>& packs, Bench bench, Take take)
+{
+    for (const std::string& pack : packs) {
+        const Result<std::shared_ptr<const Scene>> scene = load_scene(pack);
+        if (!scene.ok())
+            return report_error(scene.error());
+        const auto report = bench(*scene, [&](const std::string& text) { show_progress(pack, text); });
+        end_progress();
+        if (!report.ok())
+            return report_error(report.error());
+        take(pack, *report);
+    }
+    return kExitOk;
+}
+
 int run_bench_trims(BenchArguments arguments)
 {
     const Result<PictureSize> size = parse_size(arguments.size, 1);
@@ -178,26 +196,21 @@ int run_bench_trims(BenchArguments arguments)
 
     Json packs = Json::array();
     std::string device;
-    for (const std::string& pack : arguments.packs) {
-        const Result<std::shared_ptr<const Scene>> scene = load_scene(pack);
-        if (!scene.ok())
-            return report_error(scene.error());
-        const Result<TrimReport> report =
-            bench_trims(*scene, options, [&](const std::string& text) { show_progress(pack, text); });
-        end_progress();
-        if (!report.ok())
-            return report_error(report.error());
-        device = report->device;
+    const auto bench = [&](const auto& scene, const auto& progress) { return bench_trims(scene, options, progress); };
+    const auto take = [&](const std::string& pack, const TrimReport& report) {
+        device = report.device;
         Json object;
         object["pack"] = pack;
         object["views"] = Json::array();
-        for (const TrimView& view : report->views) {
+        for (const TrimView& view : report.views) {
             object["views"].push_back(view_json(view));
             if (!arguments.json)
                 print_view(pack, view);
         }
         packs.push_back(std::move(object));
-    }
+    };
+    if (const int code = bench_each(arguments.packs, bench, take); code != kExitOk)
+        return code;
     if (arguments.json)
         print_json({{"device", device},
                     {"width", size->width},
@@ -222,22 +235,15 @@ int run_bench_closest(ClosestArguments arguments)
     std::string device;
     double log_costs = 0; // summed over all views
     size_t views = 0;
-    for (const std::string& pack : arguments.packs) {
-        const Result<std::shared_ptr<const Scene>> scene = load_scene(pack);
-        if (!scene.ok())
-            return report_error(scene.error());
-        const Result<ClosestReport> report =
-            bench_closest(*scene, options, [&](const std::string& text) { show_progress(pack, text); });
-        end_progress();
-        if (!report.ok())
-            return report_error(report.error());
-        device = report->device;
+    const auto bench = [&](const auto& scene, const auto& progress) { return bench_closest(scene, options, progress); };
+    const auto take = [&](const std::string& pack, const ClosestReport& report) {
+        device = report.device;
         Json object;
         object["pack"] = pack;
-        object["bezier_patches"] = report->patches;
-        object["bezier_leaves"] = report->leaves;
+        object["bezier_patches"] = report.patches;
+        object["bezier_leaves"] = report.leaves;
         object["views"] = Json::array();
-        for (const ClosestView& view : report->views) {
+        for (const ClosestView& view : report.views) {
             log_costs += std::log(view.certified_cost);
             ++views;
             object["views"].push_back(view_json(view));
@@ -245,7 +251,9 @@ int run_bench_closest(ClosestArguments arguments)
                 print_view(pack, view);
         }
         packs.push_back(std::move(object));
-    }
+    };
+    if (const int code = bench_each(arguments.packs, bench, take); code != kExitOk)
+        return code;
     const double cost = std::exp(log_costs / static_cast<double>(views));
     if (arguments.json)
         print_json({{"device", device},

@@ -337,7 +337,7 @@ private:
         hit.doubt = select(moving && !within_pixel, min(newton.box_at, hit.doubt), hit.doubt);
         if (!any_lane(settled))
             return grazing;
-        SurfacePoint s = evaluate(newton, uv);
+        const SurfacePoint s = evaluate(newton, uv);
         const real2 overlap = patch_overlap(s, planes, patch_rounding(newton.degree_u, newton.degree_v));
         const mask inside = settled && abs(uv.x - 0.5f) <= 0.5f + overlap.x && abs(uv.y - 0.5f) <= 0.5f + overlap.y;
         const real r1 = dot(planes.n1, s.p) + planes.d1, r2 = dot(planes.n2, s.p) + planes.d2;
@@ -346,16 +346,8 @@ private:
         const mask near = inside && residual <= max(newton.enough, kSmallResidual) && in_range(target, t, hit);
         if (!any_lane(near))
             return grazing;
-        real3 normal = cross(s.du, s.dv);
-        const mask flat = dot(normal, normal) <= 1e-10f * dot(s.du, s.du) * dot(s.dv, s.dv) ||
-                          dot(s.du, s.du) <= 1e-10f * dot(s.dv, s.dv) || dot(s.dv, s.dv) <= 1e-10f * dot(s.du, s.du);
-        if (any_lane(near && flat)) {
-            // a pole or a degenerate side: the normal a little way inside
-            constexpr float kInwards = 1.0f / 2048;
-            s = evaluate(newton, uv + real2(0.5f - uv.x, 0.5f - uv.y) * real(kInwards));
-            normal = select(flat, cross(s.du, s.dv), normal);
-        }
-        offer(target, near, t, uv, normal, hit);
+        const auto evaluate_at = [&](real2 at) HWY_ATTR { return evaluate(newton, at); };
+        offer(target, near, t, uv, patch_normal(evaluate_at, s, uv, near), hit);
         return grazing;
     }
 
