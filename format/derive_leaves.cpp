@@ -48,6 +48,14 @@ void set_cell(const UvCell& cell, LeafRecord& leaf)
     leaf.uv_hi = hi[0] | hi[1] << 16;
 }
 
+void cell_range(const UvCell& cell, std::array<double, 2>& lo, std::array<double, 2>& hi)
+{
+    for (int i = 0; i < 2; ++i) {
+        lo[i] = std::ldexp(cell.index[i], -cell.level[i]);
+        hi[i] = std::ldexp(cell.index[i] + 1, -cell.level[i]);
+    }
+}
+
 // ---- native surfaces -----------------------------------------------------------------------------------------------
 
 Point3 normalised(const Point3& a, const Point3& fallback)
@@ -123,10 +131,7 @@ void add_native_leaves(const PatchRecord& patch, uint patch_id, std::vector<Leaf
             leaf.patch = patch_id;
             set_cell(cell, leaf);
             std::array<double, 2> lo, hi;
-            for (int i = 0; i < 2; ++i) {
-                lo[i] = std::ldexp(cell.index[i], -cell.level[i]);
-                hi[i] = std::ldexp(cell.index[i] + 1, -cell.level[i]);
-            }
+            cell_range(cell, lo, hi);
             box_native(native_piece(patch, lo, hi), leaf);
             leaves.push_back(leaf);
         }
@@ -258,10 +263,9 @@ void box_net(const Net& net, const std::vector<Point3>& p, LeafRecord& leaf)
 
 /// A piece of a patch waiting to be split or kept.
 struct Piece {
-    double excess = 0;  // worst of its measures over their limits; kept when <= 1
-    int direction = 0;  // to split
-    bool turns = false; // or its weights differ: Newton may fail
-    uint order = 0;     // of creation, to break ties
+    double excess = 0; // worst of its measures over their limits; kept when <= 1
+    int direction = 0; // to split
+    uint order = 0;    // of creation, to break ties
     UvCell cell;
     Net net;
 };
@@ -277,7 +281,6 @@ void judge(Piece& piece, double scale, const LeafOptions& options, std::vector<P
 {
     project(piece.net, scratch);
     const Shape s = measure(piece.net, scratch);
-    piece.turns = false;
     double excess[2];
     for (int i = 0; i < 2; ++i) {
         const double length = s.length[i] * scale; // in the part
@@ -285,7 +288,6 @@ void judge(Piece& piece, double scale, const LeafOptions& options, std::vector<P
         const double turning = s.turning[i] / (options.max_turning_rad * ease);
         const double aspect = length > kShortestForAspect ? s.length[i] / (options.max_aspect * s.length[1 - i]) : 0;
         const double weights = std::log2(s.weights[i]) / std::log2(kMostWeightRatio);
-        piece.turns = piece.turns || turning > 1 || weights > 1;
         excess[i] = piece.cell.level[i] < kDeepestSplit ? std::max({turning, aspect, weights}) : 0;
     }
     piece.direction = excess[1] > excess[0] ? 1 : 0;
@@ -298,14 +300,16 @@ void add_bezier_leaves(const PackImage& image, uint patch_id, const LeafOptions&
     const PatchRecord& patch = image.patches[patch_id];
     std::vector<Point3> scratch;
     std::vector<Piece> heap(1);
-    heap[0].net = load_net(image, patch);
+    const Net patch_net = load_net(image, patch);
+    heap[0].net = patch_net;
     judge(heap[0], patch.scale, options, scratch);
     const auto keep = [&](const Piece& piece) {
         LeafRecord leaf{};
         leaf.patch = patch_id;
         set_cell(piece.cell, leaf);
-        if (piece.turns)
-            leaf.quat_z_flags = kLeafFlagged << 16;
+        std::array<double, 2> lo, hi;
+        cell_range(piece.cell, lo, hi);
+        encode_leaf_bend(leaf_bend(patch_net, lo, hi), leaf);
         project(piece.net, scratch);
         box_net(piece.net, scratch, leaf);
         leaves.push_back(leaf);

@@ -1,6 +1,7 @@
 #include "format/leaf_bend.h"
 
 #include "format/leaf_geometry.h"
+#include "shaders/shared/newton_reach.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,173 +9,315 @@
 namespace trimray {
 namespace {
 
-// Rounding of nets cut and multiplied in double, of their largest point, with room.
-constexpr double kRounding = 1e-12;
+using HWY_NAMESPACE::kNewtonOutside;
+using HWY_NAMESPACE::kNewtonReach;
+using HWY_NAMESPACE::patch_rounding;
 
-/// A net of vectors of 4.
-using Vectors = Net;
+constexpr int kMostPoints = int(kMaxDegree) + 2; // along one direction, degree raised by one
 
-double binomial(int n, int k)
-{
-    double b = 1;
-    for (int i = 1; i <= k; ++i)
-        b = b * (n - k + i) / i;
-    return b;
-}
+/// (y_1, y_2, z, w, y_1 of the plane, y_2 of the plane): see raised.
+using Point6 = std::array<double, 6>;
 
-/// The net of a product of a vector net and the fourth coordinate of another, degree by degree the sum.
+/// A polynomial over [0, 1]^2 in scaled Bernstein form: coefficients times both binomials. Then to raise the degree and
+/// to multiply is to add shifted coefficients, and the binomials leave a quotient of two coefficients.
 /// Source: Farouki & Rajan 1988.
-Vectors times_weight(const Vectors& a, const Net& b)
+struct Scaled {
+    int count_u = 0, count_v = 0;
+    Point6 at[kMostPoints][kMostPoints]; // [0, count_u) x [0, count_v); only that is ever set
+};
+
+void binomials(int degree, double (&row)[kMostPoints])
 {
-    const int pa = a.count_u - 1, qa = a.count_v - 1, pb = b.count_u - 1, qb = b.count_v - 1;
-    Vectors product{pa + pb + 1, qa + qb + 1, {}};
-    product.points.assign(size_t(product.count_u) * product.count_v, Point4{});
-    for (int i = 0; i <= pa; ++i)
-        for (int j = 0; j <= qa; ++j)
-            for (int k = 0; k <= pb; ++k)
-                for (int l = 0; l <= qb; ++l) {
-                    const double share = binomial(pa, i) * binomial(pb, k) / binomial(pa + pb, i + k) *
-                                         binomial(qa, j) * binomial(qb, l) / binomial(qa + qb, j + l) *
-                                         b.points[size_t(k) * b.count_v + l][3];
-                    Point4& p = product.points[size_t(i + k) * product.count_v + j + l];
-                    for (int c = 0; c < 4; ++c)
-                        p[c] += share * a.points[size_t(i) * a.count_v + j][c];
-                }
-    return product;
+    row[0] = 1;
+    for (int i = 1; i <= degree; ++i)
+        row[i] = row[i - 1] * (degree - i + 1) / i;
 }
 
-/// d/du or d/dv over the net's own [0, 1].
-Vectors derivative(const Net& net, int direction)
+/// to = scale d/du or d/dv from. With C_i = binomial(n, i) c_i the derivative is (i + 1) C_(i+1) - (n - i) C_i.
+void derive(const Scaled& from, int direction, double scale, Scaled& to)
 {
-    Vectors d{net.count_u - (direction == 0), net.count_v - (direction == 1), {}};
-    const int degree = direction == 0 ? d.count_u : d.count_v;
-    for (int i = 0; i < d.count_u; ++i)
-        for (int j = 0; j < d.count_v; ++j) {
-            const Point4& a = net.points[size_t(i) * net.count_v + j];
-            const Point4& b = net.points[size_t(i + (direction == 0)) * net.count_v + j + (direction == 1)];
-            Point4 p;
-            for (int c = 0; c < 4; ++c)
-                p[c] = degree * (b[c] - a[c]);
-            d.points.push_back(p);
-        }
-    return d;
-}
-
-/// Degree raised by one. Source: Piegl & Tiller 5.36.
-Vectors elevated(const Vectors& net, int direction)
-{
-    Vectors up{net.count_u + (direction == 0), net.count_v + (direction == 1), {}};
-    const int n = direction == 0 ? net.count_u : net.count_v; // degree + 1
-    for (int i = 0; i < up.count_u; ++i)
-        for (int j = 0; j < up.count_v; ++j) {
+    const int step_u = direction == 0, step_v = direction == 1;
+    to.count_u = std::max(from.count_u - step_u, 1);
+    to.count_v = std::max(from.count_v - step_v, 1);
+    const int degree = (direction == 0 ? from.count_u : from.count_v) - 1;
+    for (int i = 0; i < to.count_u; ++i) {
+        for (int j = 0; j < to.count_v; ++j) {
             const int k = direction == 0 ? i : j;
-            const auto at = [&](int index) -> const Point4& {
-                return direction == 0 ? net.points[size_t(index) * net.count_v + j]
-                                      : net.points[size_t(i) * net.count_v + index];
-            };
-            Point4 p{};
             for (int c = 0; c < 4; ++c)
-                p[c] = (k > 0 ? double(k) / n * at(k - 1)[c] : 0) + (k < n ? (1 - double(k) / n) * at(k)[c] : 0);
-            up.points.push_back(p);
+                to.at[i][j][c] =
+                    degree == 0
+                        ? 0
+                        : scale * ((k + 1) * from.at[i + step_u][j + step_v][c] - (degree - k) * from.at[i][j][c]);
         }
-    return up;
+    }
 }
 
-/// S_u or S_v as vectors over a positive scalar: numerator, and the least value of what divides it.
-struct Quotient {
-    Vectors above;
-    Net below; // its fourth coordinate; empty: 1
+/// Raises the degrees until the counts are these: multiplies by (1 - t) + t.
+void raise_to(Scaled& net, int count_u, int count_v)
+{
+    for (; net.count_u < count_u; ++net.count_u) {
+        for (int j = 0; j < net.count_v; ++j) {
+            net.at[net.count_u][j] = net.at[net.count_u - 1][j];
+            for (int i = net.count_u - 1; i > 0; --i)
+                for (int c = 0; c < 4; ++c)
+                    net.at[i][j][c] += net.at[i - 1][j][c];
+        }
+    }
+    for (; net.count_v < count_v; ++net.count_v) {
+        for (int i = 0; i < net.count_u; ++i) {
+            net.at[i][net.count_v] = net.at[i][net.count_v - 1];
+            for (int j = net.count_v - 1; j > 0; --j)
+                for (int c = 0; c < 4; ++c)
+                    net.at[i][j][c] += net.at[i][j - 1][c];
+        }
+    }
+}
+
+/// The derivative at the leaf's middle and the leaf's place in its reach.
+struct Frame {
+    Point3 axis[3]; // q_1, q_2, n
+    double r11 = 0, r12 = 0, r22 = 0;
+    double half[2] = {};               // the leaf's half sides, uv_patch
+    double begin[2] = {}, end[2] = {}; // the reach less the middle
 };
 
-Quotient tangent(const Net& net, int direction, bool rational)
+/// Raises both degrees by one and sets the last two components to w times the linear map R (u - c) of the reach.
+void raise_with_plane(Scaled& net, const Frame& f)
 {
-    Quotient q{derivative(net, direction), {}};
-    if (!rational) {
-        for (Point4& p : q.above.points)
-            for (int c = 0; c < 3; ++c)
-                p[c] /= net.points[0][3];
-        return q;
+    for (int i = net.count_u; i >= 0; --i) {
+        for (int j = net.count_v; j >= 0; --j) {
+            const auto before = [&](int k, int l, int c) {
+                const int row = i - k, column = j - l;
+                return row >= 0 && row < net.count_u && column >= 0 && column < net.count_v ? net.at[row][column][c]
+                                                                                            : 0.0;
+            };
+            const double w00 = before(0, 0, 3), w10 = before(1, 0, 3), w01 = before(0, 1, 3), w11 = before(1, 1, 3);
+            const double u_w = f.begin[0] * (w00 + w01) + f.end[0] * (w10 + w11);
+            const double v_w = f.begin[1] * (w00 + w10) + f.end[1] * (w01 + w11);
+            Point6 p;
+            for (int c = 0; c < 4; ++c)
+                p[c] = before(0, 0, c) + before(1, 0, c) + before(0, 1, c) + before(1, 1, c);
+            p[4] = f.r11 * u_w + f.r12 * v_w;
+            p[5] = f.r22 * v_w;
+            net.at[i][j] = p;
+        }
     }
-    // (P / w)' = (P' w - P w') / w^2
-    Vectors a = times_weight(q.above, net);
-    const Vectors b = times_weight(net, q.above);
-    for (size_t i = 0; i < a.points.size(); ++i)
-        for (int c = 0; c < 3; ++c)
-            a.points[i][c] -= b.points[i][c];
-    q.above = elevated(a, direction);
-    q.below = times_weight(net, net);
-    return q;
+    ++net.count_u;
+    ++net.count_v;
 }
 
-Point3 value(const Quotient& q, const std::array<double, 2>& at)
+/// Largest singular value.
+double spectral_norm(const double (&m)[2][2])
 {
-    const auto point = [](const Net& net, const std::array<double, 2>& t) {
-        // de Casteljau's end point: the lower part's last
-        const Net part = part_of(part_of(net, 0, 0, std::max(t[0], 1e-300)), 1, 0, std::max(t[1], 1e-300));
-        return part.points.back();
-    };
-    const Point4 a = point(q.above, at);
-    const double w = q.below.points.empty() ? 1 : point(q.below, at)[3];
-    return {a[0] / w, a[1] / w, a[2] / w};
+    const double sum = m[0][0] * m[0][0] + m[0][1] * m[0][1] + m[1][0] * m[1][0] + m[1][1] * m[1][1];
+    const double det = m[0][0] * m[1][1] - m[0][1] * m[1][0];
+    return std::sqrt(0.5 * (sum + std::sqrt(std::max(0.0, sum * sum - 4 * det * det))));
 }
 
-/// The largest of |x - value| along the plane and across it, by the hull.
-struct Off {
-    double along = 0, across = 0;
+void keep_largest(double& largest, double value)
+{
+    largest = std::max(largest, value);
+}
+
+/// The polynomials of the homogeneous surface over the reach, moved to S_c and turned into the frame, in uv_patch.
+struct SecondOrder {
+    Scaled value, u, v, uu, uv, vv;
 };
 
-Off farthest(const Quotient& q, const Point3& from, const std::array<Point3, 3>& axes)
+/// Bounds of |D^2 y[d, .]| and |D^2 z[d, .]| added up over the leaf's two half sides d, where (y, z) is the surface in
+/// the frame as a function of y = R (u - c): D is the derivative by that, D y_c = 1 and D z_c = 0.
+/// With y = p / w, z = q / w
+///     D^2 y[d, .] = (D^2 p[d, .] - w_d D y - y_d D w - y D^2 w[d, .]) / w
+/// and D y = 1 + (at most slope), y = (its linear part) + (at most off): what comes from 1 and the linear part is one
+/// polynomial, bounded by its hull, what comes from the rest is of third order. The same for z with 0 in their place.
+LeafBend bend_of(const SecondOrder& s, const Frame& f, bool rational)
 {
-    double least = 1, largest = 0;
-    if (!q.below.points.empty()) {
-        least = std::numeric_limits<double>::infinity();
-        for (const Point4& w : q.below.points)
-            least = std::min(least, w[3]);
-    }
-    Off off;
-    for (size_t i = 0; i < q.above.points.size(); ++i) {
-        const double w = q.below.points.empty() ? 1 : q.below.points[i][3];
-        Point3 d;
-        for (int c = 0; c < 3; ++c) {
-            d[c] = q.above.points[i][c] - w * from[c];
-            largest = std::max(largest, std::abs(q.above.points[i][c]));
+    double off = 0, slope = 0, off_across = 0, slope_across = 0; // |y - R (u - c)|, |D y - 1|, |z|, |D z|
+    double grows = 0, grows_by[2] = {}, turns[2] = {};           // |D w| / w, |w_d| / w, |D^2 w[d, .]| / w
+    double along[2] = {}, across[2] = {};
+    // steps d from the middle: along half a side, in R
+    const double step[2][2] = {{f.half[0] * f.r11, 0}, {f.half[1] * f.r12, f.half[1] * f.r22}};
+    const double shear = f.r12 / f.r11;
+    for (int i = 0; i < s.value.count_u; ++i) {
+        for (int j = 0; j < s.value.count_v; ++j) {
+            const Point6 &p = s.value.at[i][j], &u = s.u.at[i][j], &v = s.v.at[i][j];
+            const Point6* second[2][2] = {{&s.uu.at[i][j], &s.uv.at[i][j]}, {&s.uv.at[i][j], &s.vv.at[i][j]}};
+            if (!(p[3] > 0))
+                return {};
+            const double per_w = 1 / p[3];
+            // D by R's columns: D_1 = d_u / r11, D_2 = (d_v - r12 / r11 d_u) / r22
+            const double first = per_w / f.r11, other = per_w / f.r22;
+            const auto d1 = [&](const Point6& of_u, int c) { return of_u[c] * first; };
+            const auto d2 = [&](const Point6& of_u, const Point6& of_v, int c) {
+                return (of_v[c] - shear * of_u[c]) * other;
+            };
+            double dw[2] = {0, 0};
+            if (rational) {
+                dw[0] = d1(u, 3);
+                dw[1] = d2(u, v, 3);
+                keep_largest(grows, std::hypot(dw[0], dw[1]));
+                keep_largest(off, per_w * std::hypot(p[0] - p[4], p[1] - p[5]));
+                keep_largest(off_across, per_w * std::abs(p[2]));
+                keep_largest(slope_across, std::hypot(d1(u, 2), d2(u, v, 2)));
+                const double m[2][2] = {{d1(u, 0) - 1 - d1(u, 4), d2(u, v, 0) - d2(u, v, 4)},
+                                        {d1(u, 1) - d1(u, 5), d2(u, v, 1) - 1 - d2(u, v, 5)}};
+                keep_largest(slope, spectral_norm(m));
+            }
+            for (int d = 0; d < 2; ++d) {
+                const Point6 &of_u = *second[d][0], &of_v = *second[d][1];
+                const double h = f.half[d];
+                double m[2][2];
+                for (int c = 0; c < 2; ++c) {
+                    m[c][0] = h * d1(of_u, c);
+                    m[c][1] = h * d2(of_u, of_v, c);
+                }
+                if (rational) {
+                    const double w_d = h * per_w * (d == 0 ? u : v)[3];
+                    for (int c = 0; c < 2; ++c) {
+                        m[c][0] -= step[d][c] * dw[0] + h * d1(of_u, 4 + c);
+                        m[c][1] -= step[d][c] * dw[1] + h * d2(of_u, of_v, 4 + c);
+                        m[c][c] -= w_d;
+                    }
+                    keep_largest(grows_by[d], std::abs(w_d));
+                    keep_largest(turns[d], h * std::hypot(d1(of_u, 3), d2(of_u, of_v, 3)));
+                }
+                keep_largest(along[d], spectral_norm(m));
+                keep_largest(across[d], h * std::hypot(d1(of_u, 2), d2(of_u, of_v, 2)));
+            }
         }
-        off.along = std::max(off.along, std::hypot(dot3(d, axes[0]), dot3(d, axes[1])));
-        off.across = std::max(off.across, std::abs(dot3(d, axes[2])));
     }
-    if (!(least > 0))
-        return {std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
-    return {(off.along + kRounding * largest) / least, (off.across + kRounding * largest) / least};
+    slope += off * grows; // D y = (D p - y D w) / w
+    slope_across += off_across * grows;
+    LeafBend bend{0, 0};
+    for (int d = 0; d < 2; ++d) {
+        const double of_slope = grows_by[d] + std::hypot(step[d][0], step[d][1]) * grows;
+        bend.along += along[d] + of_slope * slope + turns[d] * off;
+        bend.across += across[d] + of_slope * slope_across + turns[d] * off_across;
+    }
+    return bend;
 }
+
+/// Sum over the net of weight (i, j) times its points.
+template <class Weight>
+Point4 sum_of(const Net& net, Weight weight)
+{
+    Point4 sum{};
+    for (int i = 0; i < net.count_u; ++i)
+        for (int j = 0; j < net.count_v; ++j)
+            for (int c = 0; c < 4; ++c)
+                sum[c] += weight(i, j) * net.points[size_t(i) * net.count_v + j][c];
+    return sum;
+}
+
+/// Bernstein polynomials of a degree at t, and their derivatives.
+struct Basis {
+    double value[kMostPoints], slope[kMostPoints];
+    Basis(int degree, double t)
+    {
+        value[0] = 1;
+        slope[0] = 0;
+        for (int k = 1; k <= degree; ++k) {
+            if (k == degree)
+                for (int i = 0; i <= k; ++i)
+                    slope[i] = degree * ((i > 0 ? value[i - 1] : 0) - (i < k ? value[i] : 0));
+            value[k] = t * value[k - 1];
+            for (int i = k - 1; i > 0; --i)
+                value[i] = (1 - t) * value[i] + t * value[i - 1];
+            value[0] *= 1 - t;
+        }
+    }
+};
 
 } // namespace
 
-LeafBend leaf_bend(const Net& patch, const std::array<double, 2>& lo, const std::array<double, 2>& hi,
-                   const std::array<double, 2>& at)
+LeafBend leaf_bend(const Net& patch, const std::array<double, 2>& lo, const std::array<double, 2>& hi)
 {
-    const Net net = part_of(part_of(patch, 0, lo[0], hi[0]), 1, lo[1], hi[1]);
+    Frame f;
+    Net net = patch;
+    double per_side[2], middle[2]; // of the reach: 1 / side, and where the leaf's middle is
+    for (int i = 0; i < 2; ++i) {
+        f.half[i] = 0.5 * (hi[i] - lo[i]);
+        const double c = lo[i] + f.half[i];
+        const double from = std::max(c - kNewtonReach * f.half[i], -double(kNewtonOutside));
+        const double to = std::min(c + kNewtonReach * f.half[i], 1 + double(kNewtonOutside));
+        f.begin[i] = from - c;
+        f.end[i] = to - c;
+        per_side[i] = 1 / (to - from);
+        middle[i] = (c - from) * per_side[i];
+        net = part_of(net, i, from, to);
+    }
     const bool rational = net.rational();
-    const Quotient du = tangent(net, 0, rational), dv = tangent(net, 1, rational);
-    const std::array<double, 2> local{(at[0] - lo[0]) / (hi[0] - lo[0]), (at[1] - lo[1]) / (hi[1] - lo[1])};
-    const Point3 u = value(du, local), v = value(dv, local);
-    // Gram & Schmidt
-    const double r11 = std::sqrt(dot3(u, u));
-    if (!(r11 > 0))
-        return {};
-    const Point3 q0{u[0] / r11, u[1] / r11, u[2] / r11};
-    const double r12 = dot3(q0, v);
-    const Point3 rest{v[0] - r12 * q0[0], v[1] - r12 * q0[1], v[2] - r12 * q0[2]};
-    const double r22 = std::sqrt(dot3(rest, rest));
-    if (!(r22 > 0))
-        return {};
-    const Point3 q1{rest[0] / r22, rest[1] / r22, rest[2] / r22};
-    const std::array<Point3, 3> axes{q0, q1, cross3(q0, q1)};
 
-    // columns of D: e_u / r11 and (e_v - r12 / r11 e_u) / r22
-    const Off off_u = farthest(du, u, axes), off_v = farthest(dv, v, axes);
-    const double shear = std::abs(r12) / r11;
-    const auto norm = [&](double of_u, double of_v) { return std::hypot(of_u / r11, (of_v + shear * of_u) / r22); };
-    return {norm(off_u.along, off_v.along), norm(off_u.across, off_v.across)};
+    const int degree_u = net.count_u - 1, degree_v = net.count_v - 1;
+    const Basis at_u(degree_u, middle[0]), at_v(degree_v, middle[1]);
+    const Point4 p = sum_of(net, [&](int i, int j) { return at_u.value[i] * at_v.value[j]; });
+    const Point4 p_u = sum_of(net, [&](int i, int j) { return at_u.slope[i] * at_v.value[j] * per_side[0]; });
+    const Point4 p_v = sum_of(net, [&](int i, int j) { return at_u.value[i] * at_v.slope[j] * per_side[1]; });
+    const double w = p[3];
+    if (!(w > 0))
+        return {};
+    Point3 s, u, v;
+    for (int c = 0; c < 3; ++c) {
+        s[c] = p[c] / w;
+        u[c] = (p_u[c] - p_u[3] * s[c]) / w;
+        v[c] = (p_v[c] - p_v[3] * s[c]) / w;
+    }
+    // Gram & Schmidt
+    f.r11 = std::sqrt(dot3(u, u));
+    if (!(f.r11 > 0))
+        return {};
+    f.axis[0] = {u[0] / f.r11, u[1] / f.r11, u[2] / f.r11};
+    f.r12 = dot3(f.axis[0], v);
+    const Point3 rest{v[0] - f.r12 * f.axis[0][0], v[1] - f.r12 * f.axis[0][1], v[2] - f.r12 * f.axis[0][2]};
+    f.r22 = std::sqrt(dot3(rest, rest));
+    if (!(f.r22 > 0))
+        return {};
+    f.axis[1] = {rest[0] / f.r22, rest[1] / f.r22, rest[2] / f.r22};
+    f.axis[2] = cross3(f.axis[0], f.axis[1]);
+
+    SecondOrder nets;
+    double share_u[kMostPoints], share_v[kMostPoints];
+    binomials(degree_u, share_u);
+    binomials(degree_v, share_v);
+    nets.value.count_u = net.count_u;
+    nets.value.count_v = net.count_v;
+    for (int i = 0; i < net.count_u; ++i) {
+        for (int j = 0; j < net.count_v; ++j) {
+            const Point4& from = net.points[size_t(i) * net.count_v + j];
+            const double share = share_u[i] * share_v[j];
+            const Point3 moved{from[0] - from[3] * s[0], from[1] - from[3] * s[1], from[2] - from[3] * s[2]};
+            for (int c = 0; c < 3; ++c)
+                nets.value.at[i][j][c] = share * dot3(moved, f.axis[c]);
+            nets.value.at[i][j][3] = share * from[3];
+        }
+    }
+    derive(nets.value, 0, per_side[0], nets.u);
+    derive(nets.value, 1, per_side[1], nets.v);
+    derive(nets.u, 0, per_side[0], nets.uu);
+    derive(nets.u, 1, per_side[1], nets.uv);
+    derive(nets.v, 1, per_side[1], nets.vv);
+    for (Scaled* net_of : {&nets.u, &nets.v, &nets.uu, &nets.uv, &nets.vv})
+        raise_to(*net_of, net.count_u, net.count_v);
+    if (rational)
+        for (Scaled* net_of : {&nets.value, &nets.u, &nets.v, &nets.uu, &nets.uv, &nets.vv})
+            raise_with_plane(*net_of, f);
+    LeafBend bend = bend_of(nets, f, rational);
+
+    // What single precision makes of DS: a column is degree times the difference of two points of the net of one degree
+    // less, each off by at most patch_rounding / sqrt 2 in one direction (that is for two), so twice patch_rounding in
+    // the plane. Divided by the weight there: w_i / w times as much where the points are heavier than the surface, and
+    // again for w_u S, |S| <= 1. Through R^-1 as any column. The roundings of the doubles here are far below.
+    const auto error = [&](int degree, double t, double w_t) {
+        // w = (1 - t) w_0 + t w_1, w_t = degree (w_1 - w_0), w_0 and w_1 the weights of the two points
+        const double of_end = degree > 0 ? std::max(-t * w_t, (1 - t) * w_t) / (degree * w) : 0;
+        return 2.0 * degree * patch_rounding(degree_u, degree_v) * (rational ? 2 * (1 + of_end) : 1);
+    };
+    const double error_u = error(degree_u, lo[0] + f.half[0], p_u[3]);
+    const double error_v = error(degree_v, lo[1] + f.half[1], p_v[3]);
+    const double rounding = std::hypot(error_u / f.r11, (error_v + std::abs(f.r12) / f.r11 * error_u) / f.r22);
+    bend.along += rounding;
+    bend.across += rounding;
+    return bend;
 }
 
 } // namespace trimray

@@ -1,5 +1,4 @@
-// How far a leaf is from a plane with a linear map: what proves that a ray meets it once, and that Newton finds the
-// hit.
+// How fast a leaf's derivatives change: what proves that a ray meets it at most once, and that Newton finds the hit.
 #pragma once
 
 #include "format/bezier_net.h"
@@ -9,26 +8,34 @@
 
 namespace trimray {
 
-/// Bounds over a rectangle of uv_patch of D = (DS - DS_0) R^-1, where DS = [S_u S_v], DS_0 = Q R (QR decomposition) is
-/// its value at a point and n the unit normal there.
+/// Bounds of how the derivative DS = [S_u S_v] changes near a leaf. With c the leaf's middle, h its half sides, both in
+/// uv_patch, DS_c = Q R (QR decomposition) and n the unit normal there: for all a, b in the leaf's reach (as far as
+/// Newton's iterates may go: shaders/shared/newton_reach.h) and any l > 0 with |a_i - b_i| <= l h_i
+///     |Q^T (DS_a - DS_b) R^-1| <= l along        |n^T (DS_a - DS_b) R^-1| <= l across        (spectral norms)
 ///
-/// A ray at the angle b to the plane of DS_0 sees the surface through F = P S, P the projection along the ray. Then
-/// |(P DS_0 R^-1)^-1 P D| <= k := along + across / tan b, since the inverse leaves Q's part as it is and scales n's
-/// by 1 / tan b. Where k < 1, F is injective on the rectangle (it is convex, and (P DS_0)^-1 F is the identity but for
-/// a contraction): the ray meets it at most once. And if it does, then within the distance k / (1 - k) |d| of u + d, in
-/// the norm |R .|, where u is the point of DS_0 and d Newton's step from there. Source: the contraction mapping
-/// theorem; Ortega & Rheinboldt, 5.1 and 12.
+/// What that means for a ray: with b its angle to the plane of DS_c it sees the surface through F = P S, P the
+/// projection along the ray onto that plane, P x = Q^T x + (something of length 1 / tan b) n^T x. Since P DS_c = R,
+///     |P (DS_a - DS_b) R^-1| <= l k        k = along + across / tan b
+/// so with y = R (u - c) the map y - F(y) has the Lipschitz constant k in the leaf (l = 1 from its middle) and 2k in
+/// the reach (l = 2). Both are convex, so where k < 1 the ray meets the leaf at most once, where 2k < 1 the reach. And
+/// Newton's step d from c is the root of F's linear part: a root u in the leaf, at the share s <= 1 of l = 1, has
+///     |R (u - c - d)| <= integral over t in [0, 1] of |(F'(c + t (u - c)) - F'(c)) R^-1| |R (u - c)| <= k/2 |R (u -
+///     c)|
+/// Source: the contraction mapping theorem, Ortega & Rheinboldt 5.1 and 12.1; existence: Krawczyk 1969.
 struct LeafBend {
-    double along = std::numeric_limits<double>::infinity();  // |Q^T D|
-    double across = std::numeric_limits<double>::infinity(); // |n^T D|
+    double along = std::numeric_limits<double>::infinity();
+    double across = std::numeric_limits<double>::infinity();
 
-    /// A ray steeper than this meets the rectangle at most once: tan b > across / (1 - along). Infinity: none is.
-    double least_slope() const { return along < 1 ? across / (1 - along) : std::numeric_limits<double>::infinity(); }
+    /// A ray steeper than this, tan b, meets the reach at most once: 2 k < 1. Infinity: none is.
+    double least_slope() const
+    {
+        return along < 0.5 ? across / (0.5 - along) : std::numeric_limits<double>::infinity();
+    }
 };
 
-/// Of a patch's net over [lo, hi] in uv_patch, with DS_0 at `at`. Bounds by the convex hulls of derivatives' nets;
-/// infinite where DS_0 has no plane. Domain: weights positive over the rectangle.
-LeafBend leaf_bend(const Net& patch, const std::array<double, 2>& lo, const std::array<double, 2>& hi,
-                   const std::array<double, 2>& at);
+/// Of the leaf [lo, hi] in uv_patch of a patch with this net, in patch units. Holds for what single precision makes of
+/// DS, too. Infinite where DS_c has no plane, or where a weight of the reach's net is not positive.
+/// By convex hulls of the second derivatives over the reach.
+LeafBend leaf_bend(const Net& patch, const std::array<double, 2>& lo, const std::array<double, 2>& hi);
 
 } // namespace trimray

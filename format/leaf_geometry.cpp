@@ -1,6 +1,7 @@
 #include "format/leaf_geometry.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -90,6 +91,26 @@ double largest_on_arc(double a, double b, double lo, double hi)
     return std::max(a * std::cos(lo) + b * std::sin(lo), a * std::cos(hi) + b * std::sin(hi));
 }
 
+double bend_of_code(uint code)
+{
+    if (code == kBendNone)
+        return std::numeric_limits<double>::infinity();
+    return std::bit_cast<float>((code << 20) + kBendOneBits);
+}
+
+/// The least code whose value is not below.
+uint code_of_bend(double bend)
+{
+    uint code = 0;
+    if (!(bend <= bend_of_code(kBendNone - 1)))
+        return kBendNone;
+    if (bend > bend_of_code(0)) // the next code below, if not its own
+        code = (std::bit_cast<uint>(float(bend)) - kBendOneBits) >> 20;
+    while (bend_of_code(code) < bend)
+        ++code;
+    return code;
+}
+
 } // namespace
 
 OrientedBox decode_leaf_box(const LeafRecord& leaf)
@@ -100,7 +121,7 @@ OrientedBox decode_leaf_box(const LeafRecord& leaf)
     box.half = {(leaf.center_z_half_x >> 16) * double(kLeafQuantum), (leaf.half_yz & 0xffffu) * double(kLeafQuantum),
                 (leaf.half_yz >> 16) * double(kLeafQuantum)};
     box.axis = axes_of(signed_low(leaf.quat_xy) / kQuatUnit, signed_high(leaf.quat_xy) / kQuatUnit,
-                       signed_low(leaf.quat_z_flags) / kQuatUnit);
+                       signed_low(leaf.quat_z_bend) / kQuatUnit);
     return box;
 }
 
@@ -115,7 +136,7 @@ std::array<Point3, 3> encode_leaf_axes(const std::array<Point3, 3>& axes, LeafRe
     };
     const int x = rounded(r[1][2] - r[2][1]), y = rounded(r[2][0] - r[0][2]), z = rounded(r[0][1] - r[1][0]);
     leaf.quat_xy = low_bits(x) | low_bits(y) << 16;
-    leaf.quat_z_flags = (leaf.quat_z_flags & 0xffff0000u) | low_bits(z);
+    leaf.quat_z_bend = (leaf.quat_z_bend & 0xffff0000u) | low_bits(z);
     return axes_of(x / kQuatUnit, y / kQuatUnit, z / kQuatUnit);
 }
 
@@ -144,6 +165,16 @@ void encode_leaf_extent(const std::array<Point3, 3>& axes, const Point3& lo, con
     leaf.center_xy = low_bits(center[0]) | low_bits(center[1]) << 16;
     leaf.center_z_half_x = low_bits(center[2]) | low_bits(half[0]) << 16;
     leaf.half_yz = low_bits(half[1]) | low_bits(half[2]) << 16;
+}
+
+LeafBend decode_leaf_bend(const LeafRecord& leaf)
+{
+    return {bend_of_code(leaf.quat_z_bend >> 16 & 0xffu), bend_of_code(leaf.quat_z_bend >> 24)};
+}
+
+void encode_leaf_bend(const LeafBend& bend, LeafRecord& leaf)
+{
+    leaf.quat_z_bend = (leaf.quat_z_bend & 0xffffu) | code_of_bend(bend.along) << 16 | code_of_bend(bend.across) << 24;
 }
 
 NativePiece native_piece(const PatchRecord& patch, const std::array<double, 2>& lo, const std::array<double, 2>& hi)

@@ -1,7 +1,8 @@
-// Where leaves are: oriented boxes in and out of a LeafRecord, in double, and exact bounds of native surfaces. For the
-// code that derives leaves and trees; the tracers decode in shaders/shared.
+// Where leaves are: oriented boxes and bounds in and out of a LeafRecord, in double, and exact bounds of native
+// surfaces. For the code that derives leaves and trees; the tracers decode in shaders/shared.
 #pragma once
 
+#include "format/leaf_bend.h"
 #include "format/pack_image.h"
 
 #include <array>
@@ -36,6 +37,12 @@ std::array<Point3, 3> encode_leaf_axes(const std::array<Point3, 3>& axes, LeafRe
 /// Domain: points within 2 patch units of the origin.
 void encode_leaf_extent(const std::array<Point3, 3>& axes, const Point3& lo, const Point3& hi, double margin,
                         LeafRecord& leaf);
+
+/// The bounds of a leaf's record, infinite where it has none.
+LeafBend decode_leaf_bend(const LeafRecord& leaf);
+
+/// Writes bounds into the record, rounded up.
+void encode_leaf_bend(const LeafBend& bend, LeafRecord& leaf);
 
 /// A native surface in patch units over a rectangle of its own parameters.
 struct NativePiece {

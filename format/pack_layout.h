@@ -92,9 +92,12 @@ struct LeafRecord {
     uint center_z_half_x; // int16 | uint16 << 16; half extent = k / 16384
     uint half_yz;         // uint16 | uint16 << 16
     uint quat_xy;         // int16 each, k / 32767; w = sqrt(1 - x^2 - y^2 - z^2) >= 0 (see decode in shaders/shared)
-    uint quat_z_flags;    // int16 z | flags << 16 (kLeafFlagged: not certified to hold one hit a ray)
+    uint quat_z_bend;     // int16 z | along << 16 | across << 24: codes of how fast its derivatives change
 };
-TRIMRAY_CONST uint kLeafFlagged = 1u;
+// A code of 8 bits, rounded up: 2^(e - 20) (1 + m / 8) with e = code >> 3, m = code & 7. What it bounds is written at
+// LeafBend (format/leaf_bend.h); of a native surface both are 0.
+TRIMRAY_CONST uint kBendNone = 255u;          // no bound
+TRIMRAY_CONST uint kBendOneBits = 107u << 23; // a code's value has the float's bits (code << 20) + this
 TRIMRAY_CONST float kLeafQuantum = 1.0f / 16384.0f;
 TRIMRAY_CONST float kLeafUvQuantum = 1.0f / 32768.0f;
 

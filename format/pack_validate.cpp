@@ -463,12 +463,13 @@ private:
                 if (u_lo >= u_hi || v_lo >= v_hi || u_hi > 32768 || v_hi > 32768)
                     report_.add(3226, "LEAF", fmt::format("leaf {}: [{}, {}] x [{}, {}]", i, u_lo, u_hi, v_lo, v_hi));
                 const auto quat = [](uint bits) { return static_cast<int16_t>(bits & 0xffff) / 32767.0; };
-                const double x = quat(leaf.quat_xy), y = quat(leaf.quat_xy >> 16), z = quat(leaf.quat_z_flags);
+                const double x = quat(leaf.quat_xy), y = quat(leaf.quat_xy >> 16), z = quat(leaf.quat_z_bend);
                 constexpr double kRounding = 3.0 / 32767; // of three components, half a step each way
                 if (x * x + y * y + z * z > 1 + kRounding)
                     report_.add(3227, "LEAF", fmt::format("leaf {}: quaternion {} {} {}", i, x, y, z));
-                if (leaf.quat_z_flags >> 16 & ~kLeafFlagged)
-                    report_.add(3211, "LEAF", fmt::format("leaf {}: unknown flags", i));
+                if (leaf.quat_z_bend >> 16 != 0 && leaf.patch < image_.patches.size() &&
+                    (image_.patches[leaf.patch].shape & 0xffu) != kKindBezier)
+                    report_.add(3239, "LEAF", fmt::format("leaf {}: a native surface bends", i));
             }
         }
     }

@@ -292,7 +292,7 @@ private:
             base + per_t * in_box.near};
         const mask grazing = newton_from(target, newton, middle, moving, origin, direction, hit);
         // where a leaf may hold more roots than one: the rest of its starts, for the rays that this concerns
-        mask again = (box.flags & kLeafFlagged) != 0 ? moving : grazing;
+        mask again = box.along >= 0.5f ? moving : grazing;
         if (!any_lane(again))
             return;
         for (int i = 0; i < kMoreStarts; ++i)

@@ -10,6 +10,7 @@
 #include "format/pack_layout.h"
 #include "runtime/cpu_lanes.h"
 #include "shaders/shared/language.h"
+#include "shaders/shared/leaf_box.h"
 #include "shaders/shared/shading.h"
 
 #include <algorithm>
@@ -88,7 +89,7 @@ FN real3 to_world(const float (&m)[3][3], real3 n)
         out.uv_file =
             select(here, real2(lo[0] + size[0] * hit.uv_face.x, lo[1] + size[1] * hit.uv_face.y), out.uv_file);
         out.face = select(here, integer(patch.face), out.face);
-        if ((leaf.quat_z_flags >> 16 & kLeafFlagged) != 0)
+        if (bend_value(leaf.quat_z_bend >> 16 & 0xffu) >= 0.5f)
             out.certified = out.certified && !here;
     }
     return out;

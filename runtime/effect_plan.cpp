@@ -1,8 +1,11 @@
 #include "runtime/effect_plan.h"
 
+#include "format/leaf_geometry.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 namespace trimray {
 namespace {
@@ -156,7 +159,7 @@ std::vector<EffectItem> effect_plan(const PackImage& image, const RenderOptions&
     add_placements(image, plan);
     add_colors(image, plan);
     const size_t flagged =
-        count_if(image.leaves, [](const LeafRecord& leaf) { return ((leaf.quat_z_flags >> 16) & kLeafFlagged) != 0; });
+        count_if(image.leaves, [](const LeafRecord& leaf) { return std::isinf(decode_leaf_bend(leaf).least_slope()); });
     if (options.closest == ClosestPolicy::Stochastic)
         plan.push_back({"stochastic-starts", "asked for: one start a leaf and frame, the nearest hit of all frames"});
     else if (flagged > 0)

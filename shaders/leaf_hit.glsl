@@ -357,7 +357,7 @@ void bezier_hit(PatchRay ray, PatchRecord patch, FaceRecord face, LeafBox box, f
         return;
     }
     vec2 uv = 0.5f * (box.uv_lo + box.uv_hi);
-    bool again = (box.flags & kLeafFlagged) != 0u;
+    bool again = box.along >= 0.5f;
     for (int start = 0; start <= kMoreStarts; ++start) {
         if (start > 0 && iteration_limit > 0u && iterations + uint(kNewtonSteps + 1) * newton.work > kRoundIterations) {
             hit.doubt = min(hit.doubt, box_past);

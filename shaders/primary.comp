@@ -242,7 +242,7 @@ FramePixel hit_pixel(Hit hit, vec2 pixel, vec3 across)
     result.uv_face = float[2](hit.uv_face.x, hit.uv_face.y);
     result.face = patch.face;
     result.instance = hit.instance;
-    bool flagged = (leaf.quat_z_flags >> 16 & kLeafFlagged) != 0u;
+    bool flagged = bend_value(leaf.quat_z_bend >> 16 & 0xffu) >= 0.5f;
     result.status = kPixelHit | (flagged || hit.doubt <= hit.past ? 0u : kPixelCertified);
     result.rgba = float[4](0.0f, 0.0f, 0.0f, 1.0f);
     if (has_feature(kFeatureShade)) {

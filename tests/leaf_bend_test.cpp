@@ -1,5 +1,5 @@
-// Bounds of how leaves bend: no sample exceeds them, they are not far above, and rays steeper than they ask for meet a
-// leaf once.
+// Bounds of how fast a leaf's derivatives change: no sample exceeds them, they are not far above, and rays steeper than
+// they ask for meet a leaf's reach once.
 #include "format/leaf_bend.h"
 
 #include "format/bezier_reference.h"
@@ -19,9 +19,13 @@ using reference::BezierReference;
 using reference::SurfacePoint;
 using test::random_pack;
 using test::RandomSurfaces;
+using test::uv_of;
+using Place = std::array<double, 2>;
+
+constexpr double kReach = 2, kOutside = 1e-3; // as in shaders/shared/newton_reach.h
 
 struct Frame {
-    Point3 axis[3]; // q0, q1, n
+    Point3 axis[3]; // q_1, q_2, n
     double r11, r12, r22;
 };
 
@@ -43,90 +47,134 @@ Frame frame_of(const SurfacePoint& s)
     return f;
 }
 
-/// Leaves of random Bezier patches, rational and not, with the patch's reference.
-template <class Visit>
-void for_each_leaf(uint32_t seed, Visit visit)
+/// |Q^T (DS_a - DS_b) R^-1| and |n^T (DS_a - DS_b) R^-1|.
+LeafBend change(const Frame& f, const SurfacePoint& a, const SurfacePoint& b)
 {
-    PackImage image = random_pack(seed, 4, 12);
-    derive_leaves(image, LeafOptions{});
-    for (const LeafRecord& leaf : image.leaves) {
-        const PatchRecord& patch = image.patches[leaf.patch];
-        if ((patch.shape & 0xffu) != kKindBezier)
-            continue;
-        const std::array<double, 2> lo{(leaf.uv_lo & 0xffffu) / 32768.0, (leaf.uv_lo >> 16) / 32768.0};
-        const std::array<double, 2> hi{(leaf.uv_hi & 0xffffu) / 32768.0, (leaf.uv_hi >> 16) / 32768.0};
-        const BezierReference reference(patch, image.control_points.data(), 0, 0);
-        visit(load_net(image, patch), reference, lo, hi);
+    double d[2][3]; // columns
+    for (int k = 0; k < 3; ++k) {
+        const double of_u = dot3(a.du, f.axis[k]) - dot3(b.du, f.axis[k]);
+        const double of_v = dot3(a.dv, f.axis[k]) - dot3(b.dv, f.axis[k]);
+        d[0][k] = of_u / f.r11;
+        d[1][k] = (of_v - f.r12 / f.r11 * of_u) / f.r22;
+    }
+    // the largest singular value of the 2 x 2 part
+    const double sum = d[0][0] * d[0][0] + d[1][0] * d[1][0] + d[0][1] * d[0][1] + d[1][1] * d[1][1];
+    const double det = d[0][0] * d[1][1] - d[1][0] * d[0][1];
+    return {std::sqrt(0.5 * (sum + std::sqrt(std::max(0.0, sum * sum - 4 * det * det)))), std::hypot(d[0][2], d[1][2])};
+}
+
+struct Leaf {
+    Place lo, hi;
+
+    double middle(int i) const { return 0.5 * (lo[i] + hi[i]); }
+    double half(int i) const { return 0.5 * (hi[i] - lo[i]); }
+    double from(int i) const { return std::max(middle(i) - kReach * half(i), -kOutside); }
+    double to(int i) const { return std::min(middle(i) + kReach * half(i), 1 + kOutside); }
+};
+
+/// A wavy patch of the given degrees as a pack of its own.
+PackImage wavy_patch(RandomSurfaces& random, int degree_u, int degree_v, bool rational, double wave)
+{
+    PatchRecord patch{};
+    patch.shape = kKindBezier | uint(degree_u) << 8 | uint(degree_v) << 16 | (rational ? kShapeRational : 0);
+    patch.scale = 1;
+    PackImage image;
+    image.patches = {patch};
+    for (int i = 0; i <= degree_u; ++i) {
+        for (int j = 0; j <= degree_v; ++j) {
+            const double w = rational ? std::exp(random.uniform(-wave, wave)) : 1;
+            for (const double place : {0.5 * (i + wave * random.uniform(-1, 1)) / degree_u,
+                                       0.5 * (j + wave * random.uniform(-1, 1)) / degree_v,
+                                       0.5 * wave * random.uniform(-1, 1) / std::max(degree_u, degree_v)})
+                image.control_points.push_back(float(w * place));
+            if (rational)
+                image.control_points.push_back(float(w));
+        }
+    }
+    return image;
+}
+
+TEST(leaf_bend, no_two_derivatives_in_the_reach_differ_by_more_and_the_bounds_are_near)
+{
+    RandomSurfaces random(3);
+    long outside = 0, samples = 0;
+    std::vector<double> room[2]; // bound over largest sample, of leaves that turn little: polynomial, rational
+    for (int trial = 0; trial < 1200; ++trial) {
+        const bool rational = trial % 2 == 1;
+        const PackImage image = wavy_patch(random, random.integer(1, 9), random.integer(1, 9), rational, 0.4);
+        Leaf leaf{{0, 0}, {1, 1}};
+        for (int i = 0; i < 2; ++i) {
+            const int pieces = 1 << random.integer(0, 5), at = random.integer(0, pieces - 1);
+            leaf.lo[i] = double(at) / pieces;
+            leaf.hi[i] = double(at + 1) / pieces;
+        }
+        const LeafBend bend = leaf_bend(load_net(image, image.patches[0]), leaf.lo, leaf.hi);
+        const BezierReference reference(image.patches[0], image.control_points.data(), 0, 0);
+        const Frame f = frame_of(reference.evaluate(leaf.middle(0), leaf.middle(1)));
+        LeafBend largest{0, 0};
+        for (int i = 0; i < 60; ++i) {
+            Place a, b;
+            double share = 0; // l: the largest |a_i - b_i| / h_i
+            const double far = i % 3 == 0 ? 0.1 : 1;
+            for (int c = 0; c < 2; ++c) {
+                const int side = random.integer(0, 3);
+                a[c] = side == 0 ? leaf.from(c) : side == 1 ? leaf.to(c) : random.uniform(leaf.from(c), leaf.to(c));
+                b[c] = a[c] + far * (random.uniform(leaf.from(c), leaf.to(c)) - a[c]);
+                share = std::max(share, std::abs(a[c] - b[c]) / leaf.half(c));
+            }
+            const LeafBend here = change(f, reference.evaluate(a[0], a[1]), reference.evaluate(b[0], b[1]));
+            largest.along = std::max(largest.along, here.along / share);
+            largest.across = std::max(largest.across, here.across / share);
+            ++samples;
+        }
+        outside += largest.along > bend.along * (1 + 1e-9) || largest.across > bend.across * (1 + 1e-9);
+        if (bend.along < 0.25) {
+            room[rational].push_back(bend.along / largest.along);
+            room[rational].push_back(bend.across / largest.across);
+        }
+    }
+    EXPECT_EQ(outside, 0);
+    EXPECT_GT(samples, 40000);
+    for (std::vector<double>& of : room) {
+        ASSERT_GT(of.size(), 200u);
+        std::nth_element(of.begin(), of.begin() + long(of.size() / 2), of.end());
+        EXPECT_LT(of[of.size() / 2], 1.5) << "the bounds are far above what they bound";
     }
 }
 
-TEST(leaf_bend, no_derivative_leaves_the_bounds_and_the_bounds_are_near)
-{
-    RandomSurfaces random(3);
-    std::vector<double> used; // of the bound across
-    int leaves = 0, outside = 0;
-    for_each_leaf(
-        11, [&](const Net& net, const BezierReference& reference, std::array<double, 2> lo, std::array<double, 2> hi) {
-            const std::array<double, 2> at{0.5 * (lo[0] + hi[0]), 0.5 * (lo[1] + hi[1])};
-            const LeafBend bend = leaf_bend(net, lo, hi, at);
-            const Frame f = frame_of(reference.evaluate(at[0], at[1]));
-            double across = 0;
-            for (int i = 0; i < 40; ++i) {
-                const auto part = [&](int c) {
-                    const int side = random.integer(0, 5);
-                    return side == 0 ? lo[c] : side == 1 ? hi[c] : random.uniform(lo[c], hi[c]);
-                };
-                const double u = part(0), v = part(1);
-                const SurfacePoint s = reference.evaluate(u, v);
-                double d[2][3]; // D's columns in the frame
-                for (int a = 0; a < 3; ++a) {
-                    const double to_u = dot3(s.du, f.axis[a]) - (a == 0 ? f.r11 : 0);
-                    const double to_v = dot3(s.dv, f.axis[a]) - (a == 0 ? f.r12 : a == 1 ? f.r22 : 0);
-                    d[0][a] = to_u / f.r11;
-                    d[1][a] = (to_v - f.r12 / f.r11 * to_u) / f.r22;
-                }
-                // the largest singular value of the 2 x 2 part
-                const double p = d[0][0], q = d[1][0], r = d[0][1], t = d[1][1];
-                const double sum = p * p + q * q + r * r + t * t, det = p * t - q * r;
-                const double along = std::sqrt(0.5 * (sum + std::sqrt(std::max(0.0, sum * sum - 4 * det * det))));
-                const double off = std::hypot(d[0][2], d[1][2]);
-                across = std::max(across, off);
-                outside += along > bend.along * (1 + 1e-9) + 1e-9 || off > bend.across * (1 + 1e-9) + 1e-9;
-            }
-            used.push_back(across / bend.across);
-            ++leaves;
-        });
-    ASSERT_GT(leaves, 300);
-    EXPECT_EQ(outside, 0);
-    std::nth_element(used.begin(), used.begin() + long(used.size() / 2), used.end());
-    EXPECT_GT(used[used.size() / 2], 0.4) << "the bounds are far above what they bound";
-}
-
-TEST(leaf_bend, a_ray_steeper_than_the_bound_asks_meets_a_leaf_once)
+TEST(leaf_bend, a_ray_steeper_than_the_bound_asks_meets_the_reach_once)
 {
     RandomSurfaces random(5);
     int rays = 0, twice = 0, bounded = 0, leaves = 0;
-    for_each_leaf(12, [&](const Net& net, const BezierReference& reference, std::array<double, 2> lo,
-                          std::array<double, 2> hi) {
-        const std::array<double, 2> at{0.5 * (lo[0] + hi[0]), 0.5 * (lo[1] + hi[1])};
-        const double slope = leaf_bend(net, lo, hi, at).least_slope();
+    PackImage image = random_pack(12, 4, 12);
+    derive_leaves(image, LeafOptions{});
+    for (const LeafRecord& record : image.leaves) {
+        const PatchRecord& patch = image.patches[record.patch];
+        if ((patch.shape & 0xffu) != kKindBezier)
+            continue;
+        const auto [lo, hi] = uv_of(record);
+        const Leaf leaf{{lo[0], lo[1]}, {hi[0], hi[1]}};
+        const double slope = decode_leaf_bend(record).least_slope();
         ++leaves;
         if (!(slope < 4))
-            return;
+            continue;
         ++bounded;
-        const Frame f = frame_of(reference.evaluate(at[0], at[1]));
+        const BezierReference reference(patch, image.control_points.data(), kOutside, kOutside);
+        const Frame f = frame_of(reference.evaluate(leaf.middle(0), leaf.middle(1)));
         for (int i = 0; i < 8; ++i) {
-            const SurfacePoint through = reference.evaluate(random.uniform(lo[0], hi[0]), random.uniform(lo[1], hi[1]));
+            const SurfacePoint through =
+                reference.evaluate(random.uniform(leaf.from(0), leaf.to(0)), random.uniform(leaf.from(1), leaf.to(1)));
             const double angle = random.uniform(0, 6.283185307), tan_b = slope * random.uniform(1, 1.2);
             Point3 direction, origin;
             for (int c = 0; c < 3; ++c) {
                 direction[c] = std::cos(angle) * f.axis[0][c] + std::sin(angle) * f.axis[1][c] + tan_b * f.axis[2][c];
                 origin[c] = through.p[c] - 10 * direction[c];
             }
-            std::vector<std::array<double, 2>> met;
+            std::vector<Place> met;
             reference.intersect({origin, direction}, 0, 20, [&](const reference::Root& root) {
-                const bool here = root.u >= lo[0] && root.u <= hi[0] && root.v >= lo[1] && root.v <= hi[1];
-                const bool known = std::any_of(met.begin(), met.end(), [&](const std::array<double, 2>& other) {
+                const bool here =
+                    root.u >= leaf.from(0) && root.u <= leaf.to(0) && root.v >= leaf.from(1) && root.v <= leaf.to(1);
+                const bool known = std::any_of(met.begin(), met.end(), [&](const Place& other) {
                     return std::hypot(other[0] - root.u, other[1] - root.v) < 1e-9;
                 });
                 if (here && !known)
@@ -136,20 +184,38 @@ TEST(leaf_bend, a_ray_steeper_than_the_bound_asks_meets_a_leaf_once)
             ++rays;
             twice += met.size() > 1;
         }
-    });
+    }
     ASSERT_GT(rays, 2000);
     EXPECT_EQ(twice, 0);
     EXPECT_GT(bounded, leaves / 2);
 }
 
-TEST(leaf_bend, a_plane_does_not_bend_and_a_pole_has_no_bound)
+TEST(leaf_bend, a_plane_does_not_bend_and_a_pole_or_a_weight_of_zero_has_no_bound)
 {
-    Net plane{2, 2, {{0, 0, 0, 1}, {0, 1, 0, 1}, {2, 0, 0, 1}, {2, 1, 0, 1}}};
-    const LeafBend flat = leaf_bend(plane, {0, 0}, {1, 1}, {0.5, 0.5});
-    EXPECT_LT(flat.along, 1e-9);
-    EXPECT_LT(flat.across, 1e-9);
-    Net pole{2, 2, {{0, 0, 0, 1}, {0, 0, 0, 1}, {2, 0, 0, 1}, {2, 1, 0, 1}}};
-    EXPECT_EQ(leaf_bend(pole, {0, 0}, {1, 1}, {0, 0.5}).least_slope(), std::numeric_limits<double>::infinity());
+    const Net plane{2, 2, {{0, 0, 0, 1}, {0, 1, 0, 1}, {1, 0, 0, 1}, {1, 1, 0, 1}}};
+    const LeafBend flat = leaf_bend(plane, {0, 0}, {1, 1});
+    EXPECT_LT(flat.along, 1e-5); // what rounding may do
+    EXPECT_LT(flat.across, 1e-5);
+    const Net line{2, 2, {{0, 0, 0, 1}, {0, 0, 0, 1}, {1, 0, 0, 1}, {1, 0, 0, 1}}};
+    EXPECT_TRUE(std::isinf(leaf_bend(line, {0, 0}, {1, 1}).along));
+    const Net pole{2, 2, {{0, 0, 0, 1}, {0, 0, 0, 1}, {1, 0, 0, 1}, {1, 1, 0, 1}}};
+    for (const double side : {0.5, 1e-3, 3e-5})
+        EXPECT_TRUE(std::isinf(leaf_bend(pole, {0, 0}, {side, 1}).least_slope())) << side;
+    const Net weightless{2, 2, {{0, 0, 0, 1}, {0, 1, 0, 1}, {1, 0, 0, 1}, {0, 0, 0, 0}}};
+    EXPECT_TRUE(std::isinf(leaf_bend(weightless, {0, 0}, {1, 1}).along));
+}
+
+TEST(leaf_bend, a_leaf_half_as_long_bends_half_as_much)
+{
+    RandomSurfaces random(8);
+    for (const bool rational : {false, true}) {
+        const PackImage image = wavy_patch(random, 3, 3, rational, 0.3);
+        const Net net = load_net(image, image.patches[0]);
+        const LeafBend whole = leaf_bend(net, {0.375, 0.375}, {0.625, 0.625});
+        const LeafBend half = leaf_bend(net, {0.4375, 0.4375}, {0.5625, 0.5625});
+        EXPECT_LT(half.along, 0.52 * whole.along);
+        EXPECT_LT(half.across, 0.52 * whole.across);
+    }
 }
 
 } // namespace

@@ -399,6 +399,7 @@ std::vector<HostileEdit> hostile_edits()
         {3226, "leaf rectangle", [](M& m) { m.leaves[1].uv_hi = 32769u | 1u << 16; }},
         {3227, "quaternion", [](M& m) { m.leaves[1].quat_xy = 0x7fff7fffu; }},
         {3230, "unreached node", [](M& m) { m.top_nodes.push_back(m.top_nodes[0]); }},
+        {3239, "a native surface bends", [](M& m) { m.leaves[0].quat_z_bend |= 1u << 24; }},
         {3232, "child count", [](M& m) { m.top_nodes[0].child[3] = kBvhLeaf; }},
         {3233, "leaf twice", [](M& m) { m.part_nodes[0].child[1] = kBvhLeaf | 0u; }},
         {3233, "leaf outside", [](M& m) { m.part_nodes[1].child[0] = kBvhLeaf | 1u; }},

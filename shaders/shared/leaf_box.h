@@ -19,7 +19,8 @@ struct LeafBox {
     scalar3 axis_z;
     scalar2 uv_lo;
     scalar2 uv_hi;
-    uint flags;
+    scalar along; // bounds of how fast its derivatives change: LeafBend, format/leaf_bend.h
+    scalar across;
 };
 
 FN scalar signed_low_half(uint bits)
@@ -39,6 +40,14 @@ FN scalar high_half(uint bits)
     return scalar(bits >> 16);
 }
 
+// The value of a code of LeafRecord.quat_z_bend, 0 to 255; kHuge where there is no bound
+FN scalar bend_value(uint code)
+{
+    if (code == kBendNone)
+        return kHuge;
+    return bits_to_scalar((code << 20) + kBendOneBits);
+}
+
 FN LeafBox decode_leaf(LeafRecord leaf)
 {
     LeafBox box;
@@ -49,11 +58,12 @@ FN LeafBox decode_leaf(LeafRecord leaf)
         scalar3(high_half(leaf.center_z_half_x), low_half(leaf.half_yz), high_half(leaf.half_yz)) * kLeafQuantum;
     box.uv_lo = scalar2(low_half(leaf.uv_lo) * kLeafUvQuantum, high_half(leaf.uv_lo) * kLeafUvQuantum);
     box.uv_hi = scalar2(low_half(leaf.uv_hi) * kLeafUvQuantum, high_half(leaf.uv_hi) * kLeafUvQuantum);
-    box.flags = leaf.quat_z_flags >> 16;
+    box.along = bend_value(leaf.quat_z_bend >> 16 & 0xffu);
+    box.across = bend_value(leaf.quat_z_bend >> 24);
     // the quaternion's columns as a rotation: axis_x = q e_x q*, and so on
     scalar x = signed_low_half(leaf.quat_xy) * (1.0f / 32767.0f);
     scalar y = signed_high_half(leaf.quat_xy) * (1.0f / 32767.0f);
-    scalar z = signed_low_half(leaf.quat_z_flags) * (1.0f / 32767.0f);
+    scalar z = signed_low_half(leaf.quat_z_bend) * (1.0f / 32767.0f);
     scalar w = sqrt(max(1.0f - x * x - y * y - z * z, 0.0f));
     box.axis_x = scalar3(1.0f - 2.0f * (y * y + z * z), 2.0f * (x * y + w * z), 2.0f * (x * z - w * y));
     box.axis_y = scalar3(2.0f * (x * y - w * z), 1.0f - 2.0f * (x * x + z * z), 2.0f * (y * z + w * x));

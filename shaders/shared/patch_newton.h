@@ -9,6 +9,7 @@
 
 #include "shaders/shared/bezier.h"
 #include "shaders/shared/language.h"
+#include "shaders/shared/newton_reach.h"
 
 SHARED_OPEN
 
@@ -88,24 +89,11 @@ FN NewtonStep newton_step(SurfacePoint s, RayPlanes ray, real2 uv)
     return next;
 }
 
-// How far Newton's iterates may leave the leaf that they started in, in half sides from its middle: farther roots are
-// other leaves' to find. And how far they may leave the patch, in uv_patch: a rational patch has poles outside.
-const scalar kNewtonReach = 2.0f;
-const scalar kNewtonOutside = 1e-3f;
-
 FN real kept_near_leaf(real u, scalar leaf_lo, scalar leaf_hi)
 {
     scalar middle = 0.5f * (leaf_lo + leaf_hi);
     scalar reach = kNewtonReach * (middle - leaf_lo);
     return clamp(u, real(max(middle - reach, -kNewtonOutside)), real(min(middle + reach, 1.0f + kNewtonOutside)));
-}
-
-// How far across the ray a point of a patch may lie from where it should, patch units, |q| <= 1: its control points are
-// rounded to 2^-22 (2^-23 off at most), each of the degree_u + degree_v levels of its evaluation rounds twice, and a
-// ray's plane four times; in two directions across.
-FN scalar patch_rounding(int degree_u, int degree_v)
-{
-    return 1.4142136f * (2.0f + 2.0f * scalar(degree_u + degree_v) + 4.0f) * kRounding;
 }
 
 // How far outside of its patch a root may be and belong to it, in uv_patch: as far as `rounding` may have moved it, so

@@ -1,0 +1,28 @@
+// Where Newton's iterates may go, and how rounding moves a patch: what the tracers do and what is proved about a leaf
+// (format/leaf_bend.h) share.
+#if defined(TRIMRAY_SHARED_NEWTON_REACH_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef TRIMRAY_SHARED_NEWTON_REACH_H
+#undef TRIMRAY_SHARED_NEWTON_REACH_H
+#else
+#define TRIMRAY_SHARED_NEWTON_REACH_H
+#endif
+
+#include "shaders/shared/language.h"
+
+SHARED_OPEN
+
+// How far Newton's iterates may leave the leaf that they started in, in half sides from its middle: farther roots are
+// other leaves' to find. And how far they may leave the patch, in uv_patch: a rational patch has poles outside.
+const scalar kNewtonReach = 2.0f;
+const scalar kNewtonOutside = 1e-3f;
+
+// How far across the ray a point of a patch may lie from where it should, patch units, |q| <= 1: its control points are
+// rounded to 2^-22 (2^-23 off at most), each of the degree_u + degree_v levels of its evaluation rounds twice, and a
+// ray's plane four times; in two directions across.
+FN scalar patch_rounding(int degree_u, int degree_v)
+{
+    return 1.4142136f * (2.0f + 2.0f * scalar(degree_u + degree_v) + 4.0f) * kRounding;
+}
+
+SHARED_CLOSE
+#endif
