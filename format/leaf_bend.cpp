@@ -130,7 +130,7 @@ struct SecondOrder {
 ///     D^2 y[d, .] = (D^2 p[d, .] - w_d D y - y_d D w - y D^2 w[d, .]) / w
 /// and D y = 1 + (at most slope), y = (its linear part) + (at most off): what comes from 1 and the linear part is one
 /// polynomial, bounded by its hull, what comes from the rest is of third order. The same for z with 0 in their place.
-LeafBend bend_of(const SecondOrder& s, const Frame& f, bool rational)
+std::array<LeafBend, 2> bend_of(const SecondOrder& s, const Frame& f, bool rational)
 {
     double off = 0, slope = 0, off_across = 0, slope_across = 0; // |y - R (u - c)|, |D y - 1|, |z|, |D z|
     double grows = 0, grows_by[2] = {}, turns[2] = {};           // |D w| / w, |w_d| / w, |D^2 w[d, .]| / w
@@ -188,11 +188,11 @@ LeafBend bend_of(const SecondOrder& s, const Frame& f, bool rational)
     }
     slope += off * grows; // D y = (D p - y D w) / w
     slope_across += off_across * grows;
-    LeafBend bend{0, 0};
+    std::array<LeafBend, 2> bend;
     for (int d = 0; d < 2; ++d) {
         const double of_slope = grows_by[d] + std::hypot(step[d][0], step[d][1]) * grows;
-        bend.along += along[d] + of_slope * slope + turns[d] * off;
-        bend.across += across[d] + of_slope * slope_across + turns[d] * off_across;
+        bend[d].along = along[d] + of_slope * slope + turns[d] * off;
+        bend[d].across = across[d] + of_slope * slope_across + turns[d] * off_across;
     }
     return bend;
 }
@@ -231,6 +231,17 @@ struct Basis {
 } // namespace
 
 LeafBend leaf_bend(const Net& patch, const std::array<double, 2>& lo, const std::array<double, 2>& hi)
+{
+    return sum(leaf_bend_by_side(patch, lo, hi));
+}
+
+LeafBend sum(const std::array<LeafBend, 2>& by_side)
+{
+    return {by_side[0].along + by_side[1].along, by_side[0].across + by_side[1].across};
+}
+
+std::array<LeafBend, 2> leaf_bend_by_side(const Net& patch, const std::array<double, 2>& lo,
+                                          const std::array<double, 2>& hi)
 {
     Frame f;
     Net net = patch;
@@ -301,7 +312,7 @@ LeafBend leaf_bend(const Net& patch, const std::array<double, 2>& lo, const std:
     if (rational)
         for (Scaled* net_of : {&nets.value, &nets.u, &nets.v, &nets.uu, &nets.uv, &nets.vv})
             raise_with_plane(*net_of, f);
-    LeafBend bend = bend_of(nets, f, rational);
+    std::array<LeafBend, 2> by_side = bend_of(nets, f, rational);
 
     // What single precision makes of DS: a column is degree times the difference of two points of the net of one degree
     // less, each off by at most patch_rounding / sqrt 2 in one direction (that is for two), so twice patch_rounding in
@@ -315,9 +326,11 @@ LeafBend leaf_bend(const Net& patch, const std::array<double, 2>& lo, const std:
     const double error_u = error(degree_u, lo[0] + f.half[0], p_u[3]);
     const double error_v = error(degree_v, lo[1] + f.half[1], p_v[3]);
     const double rounding = std::hypot(error_u / f.r11, (error_v + std::abs(f.r12) / f.r11 * error_u) / f.r22);
-    bend.along += rounding;
-    bend.across += rounding;
-    return bend;
+    for (LeafBend& side : by_side) {
+        side.along += 0.5 * rounding;
+        side.across += 0.5 * rounding;
+    }
+    return by_side;
 }
 
 } // namespace trimray

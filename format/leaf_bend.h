@@ -38,4 +38,10 @@ struct LeafBend {
 /// By convex hulls of the second derivatives over the reach.
 LeafBend leaf_bend(const Net& patch, const std::array<double, 2>& lo, const std::array<double, 2>& hi);
 
+/// The same as its two summands: what half a side along u adds, and one along v. Splitting about halves the one; what
+/// rounding adds, shared by both, it does not lessen.
+std::array<LeafBend, 2> leaf_bend_by_side(const Net& patch, const std::array<double, 2>& lo,
+                                          const std::array<double, 2>& hi);
+LeafBend sum(const std::array<LeafBend, 2>& by_side);
+
 } // namespace trimray

@@ -91,7 +91,8 @@ struct FactRecord {
     uint32_t max_leaves_per_patch;
     uint32_t trim_textures; // kTexturesOfMasks, kTexturesSquare
     uint64_t derived_bytes; // of all derived sections, in memory; counts against the budget when they are rebuilt
-    uint64_t reserved;
+    float leaf_slope_deg;
+    uint32_t reserved;
 };
 static_assert(sizeof(FactRecord) == 112);
 

@@ -34,9 +34,12 @@ struct Provenance {
 
 /// How patches are cut into leaves. Part of the pack, so that a compact one gives the same leaves at load.
 struct LeafOptions {
-    float max_turning_rad = 0.2f; // of a leaf's control polygon, each direction; small leaves may turn more
+    float max_turning_rad = 0.4f; // of a leaf's control polygon, each direction; small leaves may turn more
     float max_aspect = 4.0f;      // longer side over shorter, on the surface
     uint max_leaves_per_patch = 1024;
+    // rays steeper than this against a leaf's plane are to meet it once by proof (LeafBend::least_slope); small leaves,
+    // and those that no split helps, are left as they are. (0, 90]
+    float leaf_slope_deg = 30.0f;
 };
 
 enum class TrimSource { Curve, Mask };

@@ -457,7 +457,8 @@ private:
         std::copy_n(facts_.bounds_hi_mm, 3, image.bounds_hi_mm);
         std::copy_n(facts_.world_origin_mm, 3, image.world_origin_mm);
         image.world_scale_mm = facts_.world_scale_mm;
-        image.leaf_options = {facts_.max_turning_rad, facts_.max_aspect, facts_.max_leaves_per_patch};
+        image.leaf_options = {facts_.max_turning_rad, facts_.max_aspect, facts_.max_leaves_per_patch,
+                              facts_.leaf_slope_deg};
         image.trim_textures.source =
             (facts_.trim_textures & kTexturesOfMasks) != 0 ? TrimSource::Mask : TrimSource::Curve;
         image.trim_textures.layout =

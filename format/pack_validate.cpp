@@ -153,11 +153,11 @@ private:
             report_.add(3204, "FACT", fmt::format("world scale {}", m.world_scale_mm));
         const LeafOptions& leaf = m.leaf_options;
         if (!(leaf.max_turning_rad > 0 && leaf.max_turning_rad <= 100 && leaf.max_aspect >= 1 &&
-              leaf.max_aspect <= kMaxMagnitude) ||
+              leaf.max_aspect <= kMaxMagnitude && leaf.leaf_slope_deg > 0 && leaf.leaf_slope_deg <= 90) ||
             leaf.max_leaves_per_patch == 0 || leaf.max_leaves_per_patch > kMaxLeavesPerPatch)
-            report_.add(
-                3205, "FACT",
-                fmt::format("leaf options {} {} {}", leaf.max_turning_rad, leaf.max_aspect, leaf.max_leaves_per_patch));
+            report_.add(3205, "FACT",
+                        fmt::format("leaf options {} {} {} {}", leaf.max_turning_rad, leaf.max_aspect,
+                                    leaf.max_leaves_per_patch, leaf.leaf_slope_deg));
     }
 
     void check_strings()

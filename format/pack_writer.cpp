@@ -185,6 +185,7 @@ FactRecord facts_of(const PackImage& image)
     facts.max_turning_rad = image.leaf_options.max_turning_rad;
     facts.max_aspect = image.leaf_options.max_aspect;
     facts.max_leaves_per_patch = image.leaf_options.max_leaves_per_patch;
+    facts.leaf_slope_deg = image.leaf_options.leaf_slope_deg;
     facts.trim_textures = (image.trim_textures.source == TrimSource::Mask ? kTexturesOfMasks : 0) |
                           (image.trim_textures.layout == TrimLayout::Square ? kTexturesSquare : 0);
     for_each_array(image, [&](std::string_view, bool is_derived, const auto& array) {

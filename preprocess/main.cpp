@@ -118,6 +118,12 @@ Result<std::optional<Options>> parse_options(int argc, char** argv)
     app.add_option("--trim-layout", layout, "Texels with equal sides on the surface, or the paper's square textures")
         ->check(CLI::IsMember({"isotropic", "square"}))
         ->capture_default_str();
+    app.add_option(
+           "--leaf-slope", options.build.leaves.leaf_slope_deg,
+           "Cut patches into leaves until rays steeper than this against a leaf, in degrees, are proved to meet "
+           "it once; fewer degrees: more leaves, fewer searches for more hits")
+        ->check(CLI::Range(1.0, 90.0))
+        ->capture_default_str();
     app.add_option("--leaf-budget", options.build.leaves.max_leaves_per_patch,
                    "Leaves of a Bezier patch at most; 1 is the paper's setting")
         ->check(CLI::Range(1u, kMaxLeavesPerPatch))
@@ -170,6 +176,7 @@ std::string provenance_options(const Options& options)
         json["trim_memory_fraction"] = options.build.trim_memory_fraction;
     json["trim_source"] = options.build.trim_textures.source == TrimSource::Mask ? "mask" : "curve";
     json["trim_layout"] = options.build.trim_textures.layout == TrimLayout::Square ? "square" : "isotropic";
+    json["leaf_slope_deg"] = options.build.leaves.leaf_slope_deg;
     json["leaf_budget"] = options.build.leaves.max_leaves_per_patch;
     json["compact"] = options.build.compact;
     return json.dump();

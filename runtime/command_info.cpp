@@ -3,6 +3,7 @@
 #include "runtime/command_report.h"
 #include "runtime/commands.h"
 #include "runtime/effect_plan.h"
+#include "runtime/leaf_slopes.h"
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -51,7 +52,11 @@ Json info_json(const LoadedPack& pack)
                                    {"reason", string_at(image, face.reason)},
                                    {"part", face.part},
                                    {"name", string_at(image, face.name)}});
-    // beyond the contract: where the pack comes from, and its size
+    // beyond the contract: how steep a ray must be for its one hit to be proved, where the pack comes from, its size
+    const LeafSlopes slopes = leaf_slopes(image);
+    info["bezier_leaves"] = {{"count", slopes.leaves}, {"flagged", slopes.flagged}};
+    for (size_t i = 0; i < slopes.proved.size(); ++i)
+        info["bezier_leaves"]["proved_above_deg"][fmt::format("{}", LeafSlopes::kDegrees[i])] = slopes.proved[i];
     info["file_bytes"] = pack.file_bytes;
     info["content_id"] = fmt::format("{:016x}", pack.content_id);
     info["compact"] = image.compact;
@@ -80,6 +85,19 @@ void print_sections(const LoadedPack& pack)
     fmt::print("{:<10}{:>12}{:>14}{:>14}  of {} bytes in the file\n", "sum", "", stored, decoded, pack.file_bytes);
 }
 
+/// How steep a ray must be against a leaf's plane to be proved to meet it at most once.
+void print_leaf_slopes(const LeafSlopes& slopes)
+{
+    if (slopes.leaves == 0)
+        return;
+    const auto percent = [&](size_t count) { return 100.0 * double(count) / double(slopes.leaves); };
+    std::string shares;
+    for (size_t i = 0; i < slopes.proved.size(); ++i)
+        shares += fmt::format("{:.1f} % above {} degrees, ", percent(slopes.proved[i]), LeafSlopes::kDegrees[i]);
+    print_row("  bezier", fmt::format("{}: one hit a ray is proved for {}flagged {:.2f} %", slopes.leaves, shares,
+                                      percent(slopes.flagged)));
+}
+
 void print_text(const LoadedPack& pack)
 {
     const PackImage& image = pack.image;
@@ -103,6 +121,7 @@ void print_text(const LoadedPack& pack)
             print_row("", fmt::format("{:<10}{:>10}", surface_kind_name(kind), by_kind[kind]));
     print_row("patches", fmt::format("{}", image.patches.size()));
     print_row("leaves", fmt::format("{}", image.leaves.size()));
+    print_leaf_slopes(leaf_slopes(image));
     const MemoryBytes bytes = memory_bytes(image);
     print_row("in memory", fmt::format("{} bytes: geometry {}, tree {}, exact trims {}, distance textures {}",
                                        bytes.total(), bytes.geometry, bytes.bvh, bytes.trim_exact, bytes.trim_sdf));

@@ -1,11 +1,10 @@
 #include "runtime/effect_plan.h"
 
-#include "format/leaf_geometry.h"
+#include "runtime/leaf_slopes.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 
 namespace trimray {
 namespace {
@@ -158,13 +157,12 @@ std::vector<EffectItem> effect_plan(const PackImage& image, const RenderOptions&
     add_trims(image, options, plan);
     add_placements(image, plan);
     add_colors(image, plan);
-    const size_t flagged =
-        count_if(image.leaves, [](const LeafRecord& leaf) { return std::isinf(decode_leaf_bend(leaf).least_slope()); });
+    const LeafSlopes slopes = leaf_slopes(image);
     if (options.closest == ClosestPolicy::Stochastic)
         plan.push_back({"stochastic-starts", "asked for: one start a leaf and frame, the nearest hit of all frames"});
-    else if (flagged > 0)
-        plan.push_back({"many-starts", fmt::format("{} not certified to hold one hit a ray, of {}",
-                                                   counted(flagged, "leaf is", "leaves are"), image.leaves.size())});
+    else if (slopes.flagged > 0)
+        plan.push_back({"many-starts", fmt::format("{} flagged, of {}: no ray is proved to meet them once",
+                                                   counted(slopes.flagged, "leaf is", "leaves are"), slopes.leaves)});
     if (options.shade) {
         plan.push_back({"shading", "the picture is asked for, not hits alone"});
         add_drawing(image, options, plan);

@@ -223,6 +223,12 @@ class Info(CliTest):
             self.assertEqual(set(item), {"name", "why"})
             self.assertTrue(item["name"] and item["why"])
 
+    def test_steeper_rays_are_proved_for_more_leaves(self):
+        leaves = self.json_of("info", PACK, "--json")["bezier_leaves"]
+        proved = [leaves["proved_above_deg"][degrees] for degrees in ["5", "10", "20", "45"]]
+        self.assertEqual(proved, sorted(proved))
+        self.assertLessEqual(proved[-1] + leaves["flagged"], leaves["count"])
+
     def test_json_says_what_is_in_the_model(self):
         if not OPTIONS.has_pack:
             self.skipTest("no converter in this build")

@@ -141,7 +141,31 @@ TEST(derive_leaves, the_budget_bounds_the_leaves_of_a_patch_and_what_still_bends
     const double with_few = flagged_area();
     EXPECT_GT(with_few, 0);
     derive_leaves(image, LeafOptions{});
-    EXPECT_LT(flagged_area(), 0.4 * with_few);
+    EXPECT_LT(flagged_area(), 0.2 * with_few);
+}
+
+TEST(derive_leaves, fewer_degrees_prove_more_rays_with_more_leaves)
+{
+    PackImage image = random_pack(14, 2, 12);
+    size_t leaves = 0;
+    double unproved = 1;
+    for (const float slope : {90.0f, 45.0f, 30.0f, 15.0f}) {
+        LeafOptions options;
+        options.leaf_slope_deg = slope;
+        derive_leaves(image, options);
+        double area = 0; // of uv_patch, whose rays of more than 15 degrees are not all proved
+        for (const LeafRecord& leaf : image.leaves) {
+            const UvRect r = uv_of(leaf);
+            area +=
+                decode_leaf_bend(leaf).least_slope() > std::tan(0.27) ? (r.hi[0] - r.lo[0]) * (r.hi[1] - r.lo[1]) : 0;
+        }
+        area /= double(image.patches.size());
+        EXPECT_GE(image.leaves.size(), leaves);
+        EXPECT_LT(area, unproved);
+        leaves = image.leaves.size();
+        unproved = area;
+    }
+    EXPECT_LT(unproved, 0.1);
 }
 
 TEST(derive_leaves, a_flat_quarter_patch_is_one_leaf_with_a_flat_box)
@@ -169,7 +193,7 @@ TEST(derive_leaves, a_flat_quarter_patch_is_one_leaf_with_a_flat_box)
     EXPECT_LE(half[2], 0.75 * (1 + 1.0 / 64) + 3 * kLeafQuantum);
 }
 
-TEST(derive_leaves, a_side_that_meets_in_one_point_but_for_rounding_is_no_reason_to_split)
+TEST(derive_leaves, a_side_that_meets_in_one_point_but_for_rounding_is_not_split_for_ever)
 {
     // a quarter of a cone: the row u = 0 is its apex, whose points differ in their last digit
     const float eps = 5.9604645e-8f, w = 0.70710678f;
@@ -185,11 +209,9 @@ TEST(derive_leaves, a_side_that_meets_in_one_point_but_for_rounding_is_no_reason
     image.parts.push_back({});
     image.parts[0].patch_count = 1;
     derive_leaves(image, LeafOptions{});
-    EXPECT_LE(image.leaves.size(), 64u);
-    for (const LeafRecord& leaf : image.leaves) { // the reach of what is flagged comes near the apex
-        const UvRect r = uv_of(leaf);
-        EXPECT_TRUE(r.lo[0] <= 2 * (r.hi[0] - r.lo[0]) || !flagged(leaf));
-    }
+    EXPECT_LE(image.leaves.size(), 256u);
+    for (const LeafRecord& leaf : image.leaves)
+        EXPECT_TRUE(uv_of(leaf).hi[0] <= 1.0 / 16 || !flagged(leaf));
 }
 
 TEST(derive_leaves, one_thread_and_two_give_the_same_leaves)

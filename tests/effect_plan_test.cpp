@@ -60,7 +60,9 @@ TEST(effect_plan, grows_by_what_is_added_and_by_nothing_else)
     image.instances[1].transform[5] = -1;
     image.instances[1].color_rgba = 0xff0000ff;
     image.faces[0].flags = kFaceHasColor;
-    image.leaves[0].quat_z_bend = 152u << 16; // along = 1/2
+    image.leaves.resize(2);
+    image.leaves[1].patch = 1;
+    image.leaves[1].quat_z_bend = 152u << 16; // along = 1/2
     EXPECT_THAT(names(image),
                 testing::ElementsAre("plane", "bezier-rational", "trim-exact", "instances", "mirrored-instances",
                                      "face-colors", "instance-colors", "many-starts", "shading"));

@@ -26,7 +26,7 @@ namespace {
 namespace fs = std::filesystem;
 using Bytes = std::vector<std::byte>;
 
-constexpr uint64_t kGoldenContentId = 0x1e25359a65f04f27; // of tests/golden/synthetic.tray
+constexpr uint64_t kGoldenContentId = 0x4f9486a89bfaabde; // of tests/golden/synthetic.tray
 
 /// A folder of its own for each test, removed afterwards.
 class PackFile : public testing::Test {

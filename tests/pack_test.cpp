@@ -82,6 +82,7 @@ void expect_same_image(const PackImage& a, const PackImage& b)
     EXPECT_EQ(a.world_scale_mm, b.world_scale_mm);
     EXPECT_EQ(a.bounds_hi_mm[2], b.bounds_hi_mm[2]);
     EXPECT_EQ(a.leaf_options.max_leaves_per_patch, b.leaf_options.max_leaves_per_patch);
+    EXPECT_EQ(a.leaf_options.leaf_slope_deg, b.leaf_options.leaf_slope_deg);
 }
 
 TEST(pack, reads_back_what_was_written)
@@ -359,6 +360,7 @@ std::vector<HostileEdit> hostile_edits()
         {3204, "part scale", [](M& m) { m.parts[0].scale_mm = 0; }},
         {3204, "patch scale", [](M& m) { m.patches[1].scale = -1; }},
         {3205, "leaf options", [](M& m) { m.leaf_options.max_leaves_per_patch = 1u << 30; }},
+        {3205, "leaf slope", [](M& m) { m.leaf_options.leaf_slope_deg = 0; }},
         {3206, "text", [](M& m) { m.strings.strings[1] = "\xC0\xAF"; }},
         {3206, "surrogate", [](M& m) { m.provenance.source_name = "\xED\xA0\x80"; }},
         {3207, "string index", [](M& m) { m.faces[2].name = 999; }},

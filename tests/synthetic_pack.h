@@ -96,7 +96,7 @@ inline void add_synthetic_trims(PackImage& image, FaceRecord& f)
 inline PackImage synthetic_image()
 {
     PackImage m;
-    m.leaf_options = {0.12f, 4.0f, 1024}; // as in the golden packs, whatever the default
+    m.leaf_options = {0.12f, 4.0f, 1024, 25.0f}; // as in the golden packs, whatever the default
     m.provenance = {"Gehäuse.step", "STEP AP214", "MM", "xxh3:0123456789abcdef", "0.1.0", "{}"};
     m.tree = {{0, m.strings.add("assembly"), 0, 0}, {0, m.strings.add("child"), 0xff00ff00u, 0}};
     const uint bezier = kKindBezier | 1u << 8 | 2u << 16 | kShapeRational;
