@@ -42,12 +42,19 @@ struct EdgeView {
     PatchView view{};
 };
 
+/// A LeafPlane (shaders/shared/leaf_proof.h), whose type is each instruction set's own.
+struct LeafMiddle {
+    float values[28];
+};
+
 /// What a block's tracing reads and writes; one a thread, reused.
 struct BlockScratch {
     CandidateScratch walk;
     std::vector<Candidate> candidates;
     std::vector<PatchView> patch_views; // by candidate
     std::vector<uint8_t> has_view;
+    std::vector<LeafMiddle> leaf_middles; // by candidate
+    std::vector<uint8_t> has_middle;
     // a tile's candidates, each array padded to whole packets
     std::vector<float> x0, x1, y0, y1, near_mm;
     std::vector<uint32_t> index;

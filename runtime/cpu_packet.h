@@ -17,9 +17,8 @@
 #include "runtime/cpu_trim.h"
 #include "runtime/cpu_trim_reference.h"
 #include "runtime/cpu_write.h"
-#include "shaders/shared/leaf_box.h"
+#include "shaders/shared/leaf_proof.h"
 #include "shaders/shared/leaf_start.h"
-#include "shaders/shared/patch_newton.h"
 #include "shaders/shared/quadric.h"
 #include "shaders/shared/rim.h"
 #include "shaders/shared/torus.h"
@@ -27,6 +26,7 @@
 #include <hwy/cache_control.h>
 
 #include <algorithm>
+#include <cstring>
 #include <limits>
 
 SHARED_OPEN
@@ -45,6 +45,8 @@ public:
         collect_candidates(job_.scene, job_.view, pixel_rect(block), scratch_.walk, scratch_.candidates, work_);
         scratch_.has_view.assign(scratch_.candidates.size(), 0);
         scratch_.patch_views.resize(std::max(scratch_.patch_views.size(), scratch_.candidates.size()));
+        scratch_.has_middle.assign(scratch_.candidates.size(), 0);
+        scratch_.leaf_middles.resize(std::max(scratch_.leaf_middles.size(), scratch_.candidates.size()));
         alignas(64) float offset_x[kLanes], offset_y[kLanes];
         for (int i = 0; i < kLanes; ++i) {
             offset_x[i] = float(i % 4) + 0.5f - middle_x;
@@ -192,7 +194,9 @@ private:
         const scalar r = patch.param[0], second = patch.param[1];
         switch (patch.shape & 0xffu) {
         case kKindPlane: {
-            const real t = plane_roots(origin, direction).t0;
+            const RootPair roots = plane_roots(origin, direction);
+            const real t = roots.t0;
+            doubt_touch(target, roots.touch, hit);
             const mask near = in_range(target, t, hit);
             if (any_lane(near))
                 offer(target, near, t, plane_uv(origin + direction * t), plane_normal(), hit);
@@ -219,7 +223,7 @@ private:
             intersect_torus(target, origin, direction, hit);
             break;
         default:
-            intersect_bezier(packet, target, origin, direction, hit);
+            intersect_bezier(packet, target, origin, direction, candidate_index, hit);
             break;
         }
         return target.changed;
@@ -242,10 +246,22 @@ private:
         return at > -float(job_.view.tau_ref) && at < hit.best + target.view.slack_mm && t < kHuge;
     }
 
+    /// Where rounding decides whether a ray meets a surface, what lies behind is not certain.
+    HWY_ATTR HWY_INLINE void doubt_touch(const Target& target, real touch, PacketHit& hit) const
+    {
+        const PatchView& view = target.view;
+        if (!any_lane(touch < kHuge))
+            return;
+        const real from = view.base_mm - view.slack_mm + view.mm_per_t * touch;
+        const mask ahead = touch < kHuge && (from > -float(job_.view.tau_ref) || touch <= -kHuge);
+        hit.doubt = select(ahead, min(from, hit.doubt), hit.doubt);
+    }
+
     template <class Uv, class Normal>
     HWY_ATTR HWY_INLINE void offer_pair(Target& target, RootPair roots, real3 origin, real3 direction, Uv uv,
                                         Normal normal, PacketHit& hit)
     {
+        doubt_touch(target, roots.touch, hit);
         for (const real& t : {roots.t0, roots.t1}) {
             const mask near = in_range(target, t, hit);
             if (!any_lane(near))
@@ -259,6 +275,7 @@ private:
     {
         const scalar R = target.patch.param[0], r = target.patch.param[1];
         const TorusRoots roots = torus_roots(R, r, origin, direction);
+        doubt_touch(target, roots.touch, hit);
         for (const real& t : {roots.t0, roots.t1, roots.t2, roots.t3}) {
             const mask near = in_range(target, t, hit);
             if (!any_lane(near))
@@ -268,9 +285,9 @@ private:
         }
     }
 
-    /// Newton from the leaf's middle in all lanes that meet its box.
+    /// All roots of the lanes that meet the leaf's box, where its bend allows a proof that they are all.
     HWY_ATTR HWY_NOINLINE void intersect_bezier(const Packet& packet, Target& target, real3 origin, real3 direction,
-                                                PacketHit& hit)
+                                                uint32_t candidate_index, PacketHit& hit)
     {
         constexpr float kBoxMargin = 1e-6f; // patch units: the ray's rounding
         const LeafBox box = decode_leaf(image_.leaves[target.candidate.leaf]);
@@ -280,116 +297,336 @@ private:
                       base + per_t * in_box.far > -float(job_.view.tau_ref);
         if (!any_lane(moving))
             return;
+        const NewtonPatch newton = newton_patch(target);
         if (job_.stochastic)
-            return intersect_once(target, box, moving, origin, direction, hit);
-        const PatchRecord& patch = target.patch;
-        const int degree_u = int(patch.shape >> 8 & 0xffu), degree_v = int(patch.shape >> 16 & 0xffu);
-        const real2 middle = scalar2(0.5f * (box.uv_lo.x + box.uv_hi.x), 0.5f * (box.uv_lo.y + box.uv_hi.y));
+            return intersect_once(target, newton, box, moving, origin, direction, hit);
+        const LeafPlane leaf = middle_of(newton, box, candidate_index);
         const RayPlanes planes = ray_planes(origin, direction);
-        const scalar enough = last_residual(job_.error_px * target.view.pixel);
-        const NewtonPatch newton{
-            patch.first_control_point, degree_u, degree_v, find_evaluate(patch.shape), enough, box, planes,
-            base + per_t * in_box.near};
-        const mask grazing = newton_from(target, newton, middle, moving, origin, direction, hit);
-        // where a leaf may hold more roots than one: the rest of its starts, for the rays that this concerns
-        mask again = box.along >= 0.5f ? moving : grazing;
-        if (!any_lane(again))
+        const SurfacePoint middle{real3(leaf.p), real3(leaf.du), real3(leaf.dv)};
+        const SeenPoint seen = seen_point(middle, planes);
+        const real bend = middle_bend(leaf, seen);
+        const mask grazing = bend >= kOneRoot;
+        if (any_lane(moving && grazing))
+            moving = moving && !(grazing && passes_by(leaf, planes, middle, seen, 1.0f, newton.rounding));
+        const mask straight = moving && !grazing;
+        mask open = moving && grazing;
+        if (any_lane(straight)) {
+            const Rectangle whole{real2(leaf.middle), leaf.half_side, leaf.size, bend};
+            const Search search = find_root(newton, leaf, whole, planes, middle, seen, straight);
+            open = open || (straight && !search.complete);
+            const Root root = end_of(newton, search, origin, direction);
+            const mask near = root.found && in_range(target, root.t, hit);
+            if (any_lane(near))
+                offer(target, near, root.t, root.uv, root.normal, hit);
+        }
+        open = open && base + per_t * in_box.near < hit.best + target.view.slack_mm;
+        if (!any_lane(open))
             return;
-        for (int i = 0; i < kMoreStarts; ++i)
-            newton_from(target, newton, newton_start(i, box.uv_lo, box.uv_hi), again, origin, direction, hit);
+        const mask doubtful = split(target, newton, leaf, planes, open, origin, direction, hit);
+        // what it found may lie a little before its box, on the next leaf
+        const real from = min(base + per_t * in_box.near, hit.best);
+        hit.doubt = select(doubtful, min(from, hit.doubt), hit.doubt);
     }
 
     struct NewtonPatch {
         uint first_control_point;
         int degree_u, degree_v;
         Evaluate evaluate;
-        scalar enough; // residual of the last step but one, patch units
-        const LeafBox& box;
-        const RayPlanes& planes;
-        real box_at; // where the leaf's box begins, tau - tau_ref in mm
+        scalar enough;   // residual of the last step, patch units
+        scalar rounding; // residual that rounding alone may leave, patch units
     };
 
-    /// Newton from one start in the lanes `moving`; offers what it finds. Returns the lanes that met the surface at a
-    /// grazing angle on their way's end.
-    HWY_ATTR HWY_NOINLINE mask newton_from(Target& target, const NewtonPatch& newton, real2 uv, mask moving,
-                                           real3 origin, real3 direction, PacketHit& hit)
-    {
-        const LeafBox& box = newton.box;
-        const RayPlanes& planes = newton.planes;
-        mask settled = mask(false), grazing = mask(false), within_pixel = mask(false);
-        for (int step = 0; step < kNewtonSteps && any_lane(moving); ++step) {
-            const SurfacePoint s = evaluate(newton, uv);
-            const NewtonStep next = newton_step(s, planes, uv);
-            work_.newton_steps += lane_count(moving);
-            // near a double root the steps only halve the residual, so there it must be small before the last one
-            const mask close = next.residual <= select(next.grazing, real(kSmallResidual), real(newton.enough));
-            within_pixel = select(moving, next.residual <= newton.enough, within_pixel);
-            const real2 to = real2(kept_near_leaf(next.uv.x, box.uv_lo.x, box.uv_hi.x),
-                                   kept_near_leaf(next.uv.y, box.uv_lo.y, box.uv_hi.y));
-            const mask stuck = newton_stuck(next, uv, to);
-            uv = select(moving, to, uv);
-            grazing = select(moving, next.grazing, grazing);
-            settled = settled || (moving && close);
-            moving = moving && !close && !stuck;
-        }
-        grazing = grazing || moving;
-        settled = settled || (moving && within_pixel); // a tangent ray
-        hit.doubt = select(moving && !within_pixel, min(newton.box_at, hit.doubt), hit.doubt);
-        if (!any_lane(settled))
-            return grazing;
-        const SurfacePoint s = evaluate(newton, uv);
-        const real2 overlap = patch_overlap(s, planes, patch_rounding(newton.degree_u, newton.degree_v));
-        const mask inside = settled && abs(uv.x - 0.5f) <= 0.5f + overlap.x && abs(uv.y - 0.5f) <= 0.5f + overlap.y;
-        const real r1 = dot(planes.n1, s.p) + planes.d1, r2 = dot(planes.n2, s.p) + planes.d2;
-        const real residual = sqrt(r1 * r1 + r2 * r2);
-        const real t = dot(s.p - origin, direction) / dot(direction, direction);
-        const mask near = inside && residual <= max(newton.enough, kSmallResidual) && in_range(target, t, hit);
-        if (!any_lane(near))
-            return grazing;
-        const auto evaluate_at = [&](real2 at) HWY_ATTR { return evaluate(newton, at); };
-        offer(target, near, t, uv, patch_normal(evaluate_at, s, uv, near), hit);
-        return grazing;
-    }
-
-    /// Plain Newton from the frame's start in the leaf, in the lanes `moving`.
-    HWY_ATTR HWY_NOINLINE void intersect_once(Target& target, const LeafBox& box, mask moving, real3 origin,
-                                              real3 direction, PacketHit& hit)
+    HWY_ATTR NewtonPatch newton_patch(const Target& target) const
     {
         const PatchRecord& patch = target.patch;
         const int degree_u = int(patch.shape >> 8 & 0xffu), degree_v = int(patch.shape >> 16 & 0xffu);
-        const Evaluate of_degree = find_evaluate(patch.shape);
-        const auto evaluate = [&](real2 uv) HWY_ATTR {
-            return of_degree(source_, patch.first_control_point, degree_u, degree_v, uv);
-        };
-        const auto count = [&](mask lanes) HWY_ATTR { work_.newton_steps += lane_count(lanes); };
-        const RayPlanes planes = ray_planes(origin, direction);
-        const auto [start_u, start_v] = job_.stochastic->start;
-        const PlainEnd end =
-            plain_newton(evaluate, count, planes, box, last_residual(job_.error_px * target.view.pixel),
-                         leaf_start(scalar2(start_u, start_v), box.uv_lo, box.uv_hi), moving);
-        if (!any_lane(end.settled))
-            return;
-        const real2 overlap = patch_overlap(end.s, planes, patch_rounding(degree_u, degree_v));
-        const mask inside =
-            end.settled && abs(end.uv.x - 0.5f) <= 0.5f + overlap.x && abs(end.uv.y - 0.5f) <= 0.5f + overlap.y;
-        const real t = dot(end.s.p - origin, direction) / dot(direction, direction);
-        const mask near = inside && in_range(target, t, hit);
-        if (any_lane(near))
-            offer(target, near, t, end.uv, patch_normal(evaluate, end.s, end.uv, near), hit);
+        return {patch.first_control_point,
+                degree_u,
+                degree_v,
+                find_evaluate(patch.shape),
+                last_residual(job_.error_px * target.view.pixel),
+                patch_rounding(degree_u, degree_v)};
     }
 
-    /// S_u x S_v at uv, where the patch's point is s; at a pole or along a degenerate side the one a little way inside.
-    template <class EvaluateAt>
-    HWY_ATTR HWY_INLINE static real3 patch_normal(EvaluateAt evaluate, const SurfacePoint& s, real2 uv, mask asked)
+    /// The leaf's plane, evaluated when the block first asks.
+    HWY_ATTR LeafPlane middle_of(const NewtonPatch& newton, const LeafBox& box, uint32_t candidate_index)
     {
+        static_assert(sizeof(LeafPlane) <= sizeof(LeafMiddle));
+        LeafMiddle& kept = scratch_.leaf_middles[candidate_index];
+        LeafPlane leaf;
+        if (!scratch_.has_middle[candidate_index]) {
+            const SurfacePoint s = evaluate(newton, real2(leaf_middle(box)));
+            leaf = leaf_plane(box, first_lane(s.p), first_lane(s.du), first_lane(s.dv));
+            std::memcpy(&kept, &leaf, sizeof leaf);
+            scratch_.has_middle[candidate_index] = 1;
+        }
+        std::memcpy(&leaf, &kept, sizeof leaf);
+        return leaf;
+    }
+
+    /// Rectangles of one leaf, one a lane.
+    struct Rectangle {
+        real2 middle;
+        scalar2 half_side;
+        scalar size; // of LeafPlane
+        real bend;   // around its middle
+    };
+
+    /// Newton's iteration in a rectangle, by lane
+    struct Search {
+        mask settled;  // ended at a root
+        mask exact;    // its last step is proved to end within rounding
+        mask complete; // proved: the rectangle holds no root but this one, and none if it has not settled
+        SurfacePoint s;
+        SeenPoint seen;
+        NewtonStep next;
+        real2 uv;
+    };
+
+    /// From the rectangle's middle, where the surface is `s`, in the lanes `moving`.
+    HWY_ATTR HWY_NOINLINE Search find_root(const NewtonPatch& newton, const LeafPlane& leaf, const Rectangle& rectangle,
+                                           const RayPlanes& planes, SurfacePoint s, SeenPoint seen, mask moving)
+    {
+        const real2 middle = rectangle.middle;
+        const scalar2 half_side = rectangle.half_side;
+        const scalar2 per_side(1.0f / half_side.x, 1.0f / half_side.y);
+        Search search{mask(false), mask(false), mask(false), s, seen, {}, middle};
+        RootBox where{middle - real2(half_side), middle + real2(half_side)};
+        mask none(false);
+        // a lane that has settled stays where it is, so that the last round's point is every settled lane's
+        for (int step = 0;; ++step) {
+            real2& uv = search.uv;
+            if (step > 0) {
+                search.s = evaluate(newton, uv);
+                search.seen = seen_point(search.s, planes);
+            }
+            search.next = newton_step(search.seen, uv);
+            const NewtonStep& next = search.next;
+            const real off = farther(uv - middle, per_side);
+            const real bend = bend_from(rectangle.bend, off);
+            const real2 moved = next.uv - uv;
+            const mask exact =
+                newton_exact(search.s, next, moved, bend * farther(moved, per_side), newton.rounding, newton.enough);
+            const mask found = moving && (exact || next.residual <= newton.rounding + next.blur);
+            search.exact = select(found, exact, search.exact);
+            search.settled = search.settled || found;
+            moving = moving && !found;
+            const real2 below = uv - where.lo, above = where.hi - uv;
+            const real far = farther(real2(max(below.x, above.x), max(below.y, above.y)), per_side);
+            const real2 blur = root_blur(search.seen, 2.0f * newton.rounding);
+            const RootBox less = narrowed(where, leaf, next.uv, (0.5f * rectangle.size) * (bend * far * far), blur);
+            const mask known = moving && !next.singular;
+            where.lo = select(known, less.lo, where.lo);
+            where.hi = select(known, less.hi, where.hi);
+            const mask empty = moving && is_empty(where);
+            none = none || empty;
+            moving = moving && !empty;
+            if (!any_lane(moving) || step == kNewtonSteps)
+                break;
+            work_.newton_steps += lane_count(moving);
+            const real2 to =
+                real2(kept_near(next.uv.x, middle.x, half_side.x), kept_near(next.uv.y, middle.y, half_side.y));
+            const mask stuck = newton_stuck(next, uv, to);
+            uv = select(moving, to, uv);
+            moving = moving && !stuck;
+        }
+        // one root at most in a rectangle as large as to hold it
+        const real off = max(farther(search.uv - middle, per_side), real(1.0f));
+        const real2 blur = root_blur(search.seen, newton.rounding);
+        const mask sharp = max(blur.x, blur.y) <= kNewtonOutside;
+        search.complete = none || (search.settled && sharp && rectangle.bend * off < kOneRoot);
+        return search;
+    }
+
+    /// The larger of |d| in half sides.
+    HWY_ATTR static real farther(real2 d, scalar2 per_side)
+    {
+        return max(abs(d.x) * per_side.x, abs(d.y) * per_side.y);
+    }
+
+    struct Root {
+        mask found; // it lies on the patch
+        real2 uv;
+        real t;
+        real3 normal;
+    };
+
+    /// What the search ended at; accepted anywhere on the patch, so that leaves leave no gaps.
+    HWY_ATTR HWY_NOINLINE Root end_of(const NewtonPatch& newton, const Search& search, real3 origin, real3 direction)
+    {
+        Root end;
+        const NewtonRoot root = newton_root(search.s, search.next, search.uv, search.exact, origin, direction);
+        const real2 overlap = patch_overlap(root_blur(search.seen, newton.rounding));
+        end.uv = root.uv;
+        end.t = root.t;
+        end.found =
+            search.settled && abs(root.uv.x - 0.5f) <= 0.5f + overlap.x && abs(root.uv.y - 0.5f) <= 0.5f + overlap.y;
+        end.normal = patch_normal(newton, search.s, search.uv, end.found);
+        return end;
+    }
+
+    /// S_u x S_v at uv, where the patch's point is s, for the lanes `asked`; beyond a side the one at the side, and at
+    /// a pole or along a degenerate side the one a little way inside.
+    HWY_ATTR HWY_NOINLINE real3 patch_normal(const NewtonPatch& newton, SurfacePoint s, real2 uv, mask asked)
+    {
+        const real2 within(clamp(uv.x, real(0.0f), real(1.0f)), clamp(uv.y, real(0.0f), real(1.0f)));
+        // beyond a side that is one point the patch is turned inside out
+        const mask beyond = asked && !(within.x == uv.x && within.y == uv.y);
+        if (any_lane(beyond)) {
+            const SurfacePoint side = evaluate(newton, within);
+            s.du = select(beyond, side.du, s.du);
+            s.dv = select(beyond, side.dv, s.dv);
+        }
         const real3 normal = cross(s.du, s.dv);
         const mask flat = dot(normal, normal) <= 1e-10f * dot(s.du, s.du) * dot(s.dv, s.dv) ||
                           dot(s.du, s.du) <= 1e-10f * dot(s.dv, s.dv) || dot(s.dv, s.dv) <= 1e-10f * dot(s.du, s.du);
         if (!any_lane(asked && flat))
             return normal;
         constexpr float kInwards = 1.0f / 2048;
-        const SurfacePoint inside = evaluate(uv + real2(0.5f - uv.x, 0.5f - uv.y) * real(kInwards));
+        const SurfacePoint inside = evaluate(newton, within + real2(0.5f - within.x, 0.5f - within.y) * real(kInwards));
         return select(flat, cross(inside.du, inside.dv), normal);
+    }
+
+    /// Plain Newton from the frame's start in the leaf, in the lanes `moving`.
+    HWY_ATTR HWY_NOINLINE void intersect_once(Target& target, const NewtonPatch& newton, const LeafBox& box,
+                                              mask moving, real3 origin, real3 direction, PacketHit& hit)
+    {
+        const RayPlanes planes = ray_planes(origin, direction);
+        const auto [start_u, start_v] = job_.stochastic->start;
+        const PlainEnd end =
+            plain_newton([&](real2 uv) HWY_ATTR { return evaluate(newton, uv); },
+                         [&](mask lanes) HWY_ATTR { work_.newton_steps += lane_count(lanes); }, planes, box,
+                         newton.enough, leaf_start(scalar2(start_u, start_v), box.uv_lo, box.uv_hi), moving);
+        if (!any_lane(end.settled))
+            return;
+        const real2 overlap = patch_overlap(root_blur(seen_point(end.s, planes), newton.rounding));
+        const mask inside =
+            end.settled && abs(end.uv.x - 0.5f) <= 0.5f + overlap.x && abs(end.uv.y - 0.5f) <= 0.5f + overlap.y;
+        const real t = dot(end.s.p - origin, direction) / dot(direction, direction);
+        const mask near = inside && in_range(target, t, hit);
+        if (any_lane(near))
+            offer(target, near, t, end.uv, patch_normal(newton, end.s, end.uv, near), hit);
+    }
+
+    static constexpr int kMostRoots = 12; // of a ray in a leaf
+
+    /// The roots of a packet's rays, in arrays by root and lane
+    struct RootLists {
+        alignas(64) float t[kMostRoots][kLanes], u[kMostRoots][kLanes], v[kMostRoots][kLanes];
+        alignas(64) float nx[kMostRoots][kLanes], ny[kMostRoots][kLanes], nz[kMostRoots][kLanes];
+        int count[kLanes] = {};
+    };
+
+    /// Offers all roots of the rays `open`, found by splitting the leaf. Returns the rays that may have more.
+    HWY_ATTR HWY_NOINLINE mask split(Target& target, const NewtonPatch& newton, const LeafPlane& leaf,
+                                     const RayPlanes& planes, mask open, real3 origin, real3 direction, PacketHit& hit)
+    {
+        alignas(64) float rays[14][kLanes];
+        const real* const values[14] = {&origin.x,    &origin.y,    &origin.z,    &direction.x, &direction.y,
+                                        &direction.z, &planes.n1.x, &planes.n1.y, &planes.n1.z, &planes.d1,
+                                        &planes.n2.x, &planes.n2.y, &planes.n2.z, &planes.d2};
+        for (int i = 0; i < 14; ++i)
+            store(*values[i], rays[i]);
+        RootLists roots;
+        uint doubtful = 0;
+        int most = 0;
+        for (uint bits = lane_bits(open); bits != 0; bits &= bits - 1) {
+            const int lane = __builtin_ctz(bits);
+            const auto all = [&](int i) HWY_ATTR { return real(rays[i][lane]); };
+            const RayPlanes ray{real3(all(6), all(7), all(8)), all(9), real3(all(10), all(11), all(12)), all(13)};
+            if (!list_roots(newton, leaf, ray, real3(all(0), all(1), all(2)), real3(all(3), all(4), all(5)), lane,
+                            roots))
+                doubtful |= 1u << lane;
+            most = std::max(most, roots.count[lane]);
+        }
+        for (int i = 0; i < most; ++i) {
+            uint has = 0;
+            for (int lane = 0; lane < kLanes; ++lane)
+                has |= uint(i < roots.count[lane]) << lane;
+            const mask lanes = open && lanes_of(has);
+            const real t = select(lanes, load(roots.t[i]), real(kHuge));
+            const mask near = lanes && in_range(target, t, hit);
+            if (any_lane(near))
+                offer(target, near, t, real2(load(roots.u[i]), load(roots.v[i])),
+                      real3(load(roots.nx[i]), load(roots.ny[i]), load(roots.nz[i])), hit);
+        }
+        return lanes_of(doubtful);
+    }
+
+    /// Of one ray, 16 rectangles of the leaf at once, and 16 of each in which that leaves something open. False: there
+    /// may be more roots than those listed.
+    HWY_ATTR HWY_NOINLINE bool list_roots(const NewtonPatch& newton, const LeafPlane& leaf, const RayPlanes& ray,
+                                          real3 origin, real3 direction, int lane, RootLists& roots)
+    {
+        struct Part {
+            float u, v; // its middle
+            int depth;
+        };
+        Part stack[kLanes * kDeepestSplit];
+        int waiting = 0, split = 0;
+        bool all = true;
+        stack[waiting++] = {leaf.middle.x, leaf.middle.y, 0};
+        const integer numbers = lane_numbers();
+        const real column = to_real(numbers & integer(3u)) * real(2.0f) - real(3.0f);
+        const real row = to_real(numbers >> integer(2u)) * real(2.0f) - real(3.0f);
+        while (waiting > 0) {
+            const Part part = stack[--waiting];
+            if (split++ == kMostSplits)
+                return false;
+            const bool last = part.depth + 1 == kDeepestSplit || leaf.along >= kHuge; // then nothing is ever proved
+            const scalar share = split_share(part.depth + 1);
+            Rectangle rectangle;
+            rectangle.half_side = scalar2(leaf.half_side.x * share, leaf.half_side.y * share);
+            rectangle.middle = real2(part.u + column * rectangle.half_side.x, part.v + row * rectangle.half_side.y);
+            rectangle.size = leaf.size * share;
+            const SurfacePoint s = evaluate(newton, rectangle.middle);
+            const SeenPoint seen = seen_point(s, ray);
+            work_.newton_steps += kLanes;
+            rectangle.bend = bend_around(leaf, ray, seen, share);
+            const mask met = !passes_by(leaf, ray, s, seen, share, newton.rounding);
+            const mask moving = met && (rectangle.bend < kOneRoot || mask(last || part.depth == 0));
+            mask open = met;
+            if (any_lane(moving)) {
+                const Search search = find_root(newton, leaf, rectangle, ray, s, seen, moving);
+                open = met && !search.complete;
+                const Root root = end_of(newton, search, origin, direction);
+                all = all && list(root, lane, roots);
+            }
+            if (last) {
+                all = all && !any_lane(open);
+                continue;
+            }
+            alignas(64) float u[kLanes], v[kLanes];
+            store(rectangle.middle.x, u);
+            store(rectangle.middle.y, v);
+            for (uint bits = lane_bits(open); bits != 0; bits &= bits - 1) {
+                const int i = __builtin_ctz(bits);
+                stack[waiting++] = {u[i], v[i], part.depth + 1};
+            }
+        }
+        return all;
+    }
+
+    /// Appends the roots that were found; false where they are too many.
+    HWY_ATTR static bool list(const Root& root, int lane, RootLists& roots)
+    {
+        alignas(64) float values[6][kLanes];
+        const real* const from[6] = {&root.t, &root.uv.x, &root.uv.y, &root.normal.x, &root.normal.y, &root.normal.z};
+        const uint found = lane_bits(root.found);
+        if (found == 0)
+            return true;
+        for (int i = 0; i < 6; ++i)
+            store(*from[i], values[i]);
+        float(*const to[6])[kLanes] = {roots.t, roots.u, roots.v, roots.nx, roots.ny, roots.nz};
+        for (uint bits = found; bits != 0; bits &= bits - 1) {
+            int& count = roots.count[lane];
+            if (count == kMostRoots)
+                return false;
+            for (int i = 0; i < 6; ++i)
+                to[i][count][lane] = values[i][__builtin_ctz(bits)];
+            ++count;
+        }
+        return true;
     }
 
     HWY_ATTR SurfacePoint evaluate(const NewtonPatch& patch, real2 uv) const

@@ -29,13 +29,14 @@ template <class EvaluateAt, class Count>
 HWY_ATTR PlainEnd plain_newton(EvaluateAt evaluate, Count count, const RayPlanes& planes, const LeafBox& box,
                                scalar enough, real2 uv, mask moving)
 {
+    const scalar2 middle = leaf_middle(box), half_side = leaf_half_side(box);
     PlainEnd end;
     end.settled = mask(false);
     for (int step = 0; step < kNewtonSteps && any_lane(moving); ++step) {
-        const NewtonStep next = newton_step(evaluate(uv), planes, uv);
+        const NewtonStep next = newton_step(seen_point(evaluate(uv), planes), uv);
         count(moving);
-        const real2 to = real2(kept_near_leaf(next.uv.x, box.uv_lo.x, box.uv_hi.x),
-                               kept_near_leaf(next.uv.y, box.uv_lo.y, box.uv_hi.y));
+        const real2 to =
+            real2(kept_near(next.uv.x, middle.x, half_side.x), kept_near(next.uv.y, middle.y, half_side.y));
         const mask close = next.residual <= enough, stuck = newton_stuck(next, uv, to);
         uv = select(moving, to, uv);
         end.settled = end.settled || (moving && close);
@@ -45,8 +46,7 @@ HWY_ATTR PlainEnd plain_newton(EvaluateAt evaluate, Count count, const RayPlanes
     if (!any_lane(end.settled))
         return end;
     end.s = evaluate(uv);
-    const real r1 = dot(planes.n1, end.s.p) + planes.d1, r2 = dot(planes.n2, end.s.p) + planes.d2;
-    end.settled = end.settled && sqrt(r1 * r1 + r2 * r2) <= enough;
+    end.settled = end.settled && length(seen_point(end.s, planes).r) <= enough;
     return end;
 }
 

@@ -27,7 +27,7 @@ struct PacketHit {
     real2 uv_face;
     real3 normal; // S_u x S_v in patch space, right-handed axes, any length
     mask back;    // it may be a rim's
-    real doubt;   // where the nearest leaf begins whose Newton did not settle, as `best`; kHuge: none
+    real doubt;   // from where on a leaf may hold hits that were not found, as `best`; kHuge: there is none
 };
 
 struct Packet {
@@ -42,7 +42,6 @@ struct PacketShading {
     real3 color;  // linear
     real2 uv_file;
     integer face;
-    mask certified;
 };
 
 FN real3 to_world(const float (&m)[3][3], real3 n)
@@ -64,7 +63,6 @@ FN real3 to_world(const float (&m)[3][3], real3 n)
     out.color = out.normal;
     out.uv_file = real2(real(0.0f), real(0.0f));
     out.face = integer(~0u);
-    out.certified = mask(true);
     for (uint left = hit_lanes; left != 0;) {
         const int lane = __builtin_ctz(left);
         const uint leaf_id = leaves[lane], instance_id = instances[lane];
@@ -89,8 +87,6 @@ FN real3 to_world(const float (&m)[3][3], real3 n)
         out.uv_file =
             select(here, real2(lo[0] + size[0] * hit.uv_face.x, lo[1] + size[1] * hit.uv_face.y), out.uv_file);
         out.face = select(here, integer(patch.face), out.face);
-        if (bend_value(leaf.quat_z_bend >> 16 & 0xffu) >= 0.5f)
-            out.certified = out.certified && !here;
     }
     return out;
 }
@@ -195,7 +191,7 @@ HWY_INLINE void copy_to_strip(const PacketPixels& pixels, uint32_t x, uint32_t y
     const real3 to_eye = along * (-1.0f / speed);
     normal = select(has_normal, normal, to_eye);
     const real3 color = shade(shading.color, normal, to_eye);
-    const mask certified = shading.certified && (hit.doubt >= kHuge || hit.doubt > hit.best);
+    const mask certified = hit.doubt >= kHuge || hit.doubt > hit.best;
 
     const real none = real(0.0f);
     const real3 shown = select(hits, job.shade ? color : real3(none, none, none), real3(none, none, none));

@@ -63,7 +63,7 @@ struct RenderOptions {
     ClosestPolicy closest = ClosestPolicy::Certified;
     uint32_t threads = 0;             // 0: all cores
     uint32_t frames = 1;              // timed frames; the picture is the last one's
-    float error_px = 0.02f;           // stop of Newton's iteration, in pixels
+    float error_px = 0.02f;           // how far off its ray, in pixels, a point that Newton ends at may lie
     bool shade = true;                // fill rgba
     bool record_trim_queries = false; // with TrimMode::Reference: fill RenderStats::trim_queries
     // Told the share of a frame that is done, by one thread at a time. By the reference alone: the others are done at
@@ -89,6 +89,9 @@ struct Frame {
     std::vector<float> uv;       // 2 a pixel, uv_file
     std::vector<int32_t> face;   // index into the pack's faces
     std::vector<int32_t> instance;
+    // 1: the hit is a root down to rounding, or there is none, and no leaf that begins before it was left open: one
+    // flagged in the pack, one whose surface the ray grazes, one where Newton ended undecided. Trims are not part of
+    // the claim: a ray may pass between two of them by rounding.
     std::vector<uint8_t> certified;
 };
 

@@ -6,9 +6,17 @@ const uint kCurveIterations = 32u;                 // bound of left_of_cubic
 const uint kTorusIterations = 3u * 24u + 4u * 32u; // bound of torus_roots
 
 // Where loops are limited, one leaf may take so many iterations: 13 steps at degree 25, and a few hundred trim pieces.
-// Where the degree is high, the later ones of Newton's starts may have to be left out, and the hit is in doubt.
+// Where the degree is high, parts of a leaf may have to be left out, and the hit is in doubt.
 const uint kRoundIterations = 20000u;
 bool overrun = false; // a leaf took more
+
+uint group_iterations = 0u; // of the whole subgroup, whose lanes share the driver's limit
+
+// Where loops are limited, what a leaf's splitting may take: a quarter of what is left
+uint split_iterations()
+{
+    return min(kRoundIterations / 2u, (iteration_limit - min(group_iterations, iteration_limit)) / 4u);
+}
 
 // The nearest hit so far. `past` is tau - view.tau_ref, so that what is far from the eye keeps its digits.
 struct Hit {
@@ -18,7 +26,7 @@ struct Hit {
     vec2 uv_patch;
     uint leaf;
     uint instance;
-    float doubt; // where the nearest leaf begins whose Newton did not settle, as `past`; kHuge: none
+    float doubt; // from where on a leaf may hold hits that were not found, as `past`; kHuge: there is none
     bool back;   // it may be a rim's
 };
 
@@ -238,22 +246,29 @@ void native_hit(PatchRay ray, PatchRecord patch, FaceRecord face, uint kind, uin
     float r = patch.param[0];
     float second = patch.param[1];
     vec4 roots = vec4(kHuge);
-    if (kind == kKindPlane && has_kind(kKindPlane))
-        roots.x = plane_roots(ray.origin, ray.direction).t0;
-    else if (kind == kKindTorus && has_kind(kKindTorus)) {
+    float touch = kHuge;
+    if (kind == kKindTorus && has_kind(kKindTorus)) {
         TorusRoots found = torus_roots(r, second, ray.origin, ray.direction);
         roots = vec4(found.t0, found.t1, found.t2, found.t3);
+        touch = found.touch;
         iterations += kTorusIterations;
     } else {
-        RootPair found = RootPair(kHuge, kHuge);
-        if (kind == kKindCylinder && has_kind(kKindCylinder))
+        RootPair found = RootPair(kHuge, kHuge, kHuge);
+        if (kind == kKindPlane && has_kind(kKindPlane))
+            found = plane_roots(ray.origin, ray.direction);
+        else if (kind == kKindCylinder && has_kind(kKindCylinder))
             found = cylinder_roots(r, ray.origin, ray.direction);
         else if (kind == kKindCone && has_kind(kKindCone))
             found = cone_roots(r, second, ray.origin, ray.direction);
         else if (kind == kKindSphere && has_kind(kKindSphere))
             found = sphere_roots(r, ray.origin, ray.direction);
         roots.xy = vec2(found.t0, found.t1);
+        touch = found.touch;
     }
+    // where rounding decides whether a ray meets a surface, what lies behind is not certain
+    float from = ray.past - ray.slack + touch;
+    if (touch < kHuge && (from > -view.tau_ref || touch <= -kHuge))
+        hit.doubt = min(hit.doubt, from);
     for (int i = 0; i < 4; ++i) {
         if (!in_range(ray, roots[i], hit))
             continue;
@@ -280,96 +295,218 @@ void copy_control_points(PatchRecord patch, uint count)
 }
 
 struct NewtonPatch {
-    uint degree_u;
-    uint degree_v;
+    uint first_control_point;
+    int degree_u;
+    int degree_v;
     bool rational;
-    float enough;   // residual of the last step but one, patch units
-    float box_past; // where the leaf's box begins
+    float enough;   // residual of the last step, patch units
+    float rounding; // residual that rounding alone may leave, patch units
     uint work;      // loop iterations of a step
-    bool rims;      // the face has a rim, and the eye sees it from outside
     RayPlanes planes;
 };
 
-// Newton from one start. A last step follows the residual that is small enough; what it ends at is accepted anywhere on
-// the patch, so that leaves leave no gaps. Returns true where the ray grazed the surface at last.
-bool newton_from(PatchRay ray, PatchRecord patch, FaceRecord face, LeafBox box, NewtonPatch newton, vec2 uv, uint leaf,
-                 uint instance, inout Hit hit)
+SurfacePoint evaluate(NewtonPatch newton, vec2 uv)
 {
-    bool settled = false;
-    bool grazing = false;
-    for (int step = 0; step <= kNewtonSteps; ++step) {
-        SurfacePoint s =
-            bezier_point(patch.first_control_point, int(newton.degree_u), int(newton.degree_v), newton.rational, uv);
-        NewtonStep next = newton_step(s, newton.planes, uv);
-        iterations += newton.work;
-        if (settled) {
-            // not `precise`: glslc follows precise values around this loop for ever
-            float t = dot(s.p - ray.origin, ray.direction) / dot(ray.direction, ray.direction);
-            vec2 overlap = patch_overlap(s, newton.planes, patch_rounding(int(newton.degree_u), int(newton.degree_v)));
-            vec2 off = abs(uv - 0.5f) - overlap;
-            if (max(off.x, off.y) <= 0.5f && next.residual <= max(newton.enough, kSmallResidual) &&
-                in_range(ray, t, hit)) {
-                bool back = newton.rims && dot(ray.direction, outward(patch, face, cross(s.du, s.dv))) > 0.0f;
-                offer(ray, patch.face, face, leaf, instance, t, uv, face_uv(patch, kKindBezier, uv), back, hit);
-            }
-            return grazing;
+    iterations += newton.work;
+    return bezier_point(newton.first_control_point, newton.degree_u, newton.degree_v, newton.rational, uv);
+}
+
+// A rectangle of a leaf
+struct Rectangle {
+    vec2 middle;
+    vec2 half_side;
+    float size; // of LeafPlane
+    float bend; // around its middle
+};
+
+// Newton's iteration in a rectangle
+struct Search {
+    bool settled;  // ended at a root
+    bool exact;    // its last step is proved to end within rounding
+    bool complete; // proved: the rectangle holds no root but this one, and none if it has not settled
+    SurfacePoint s;
+    SeenPoint seen;
+    NewtonStep next;
+    vec2 uv;
+};
+
+// The larger of |d| in half sides
+float farther(vec2 d, vec2 half_side)
+{
+    return max(abs(d.x) / half_side.x, abs(d.y) / half_side.y);
+}
+
+// From the rectangle's middle, where the surface is `s`
+Search find_root(NewtonPatch newton, LeafPlane leaf, Rectangle rectangle, SurfacePoint s, SeenPoint seen)
+{
+    Search search;
+    search.settled = false;
+    search.exact = false;
+    search.s = s;
+    search.seen = seen;
+    search.uv = rectangle.middle;
+    RootBox where = RootBox(rectangle.middle - rectangle.half_side, rectangle.middle + rectangle.half_side);
+    bool none = false;
+    for (int step = 0;; ++step) {
+        vec2 uv = search.uv;
+        if (step > 0) {
+            search.s = evaluate(newton, uv);
+            search.seen = seen_point(search.s, newton.planes);
         }
+        NewtonStep next = newton_step(search.seen, uv);
+        search.next = next;
+        float bend = bend_from(rectangle.bend, farther(uv - rectangle.middle, rectangle.half_side));
+        vec2 moved = next.uv - uv;
+        search.exact = newton_exact(search.s, next, moved, bend * farther(moved, rectangle.half_side), newton.rounding,
+                                    newton.enough);
+        search.settled = search.exact || next.residual <= newton.rounding + next.blur;
+        if (search.settled)
+            break;
+        if (!next.singular) {
+            float far = farther(max(uv - where.lo, where.hi - uv), rectangle.half_side);
+            where = narrowed(where, leaf, next.uv, (0.5f * rectangle.size) * (bend * far * far),
+                             root_blur(search.seen, 2.0f * newton.rounding));
+            none = is_empty(where);
+        }
+        if (none || step == kNewtonSteps)
+            break;
         ++newton_steps;
-        grazing = next.grazing;
-        // near a double root the steps only halve the residual, so there it must be small before the last one
-        settled = next.residual <= (grazing ? kSmallResidual : newton.enough);
-        vec2 to = vec2(kept_near_leaf(next.uv.x, box.uv_lo.x, box.uv_hi.x),
-                       kept_near_leaf(next.uv.y, box.uv_lo.y, box.uv_hi.y));
-        if (!settled && newton_stuck(next, uv, to))
-            return grazing;
-        uv = to;
-        if (!settled && step == kNewtonSteps - 1) {
-            grazing = true;
-            settled = next.residual <= newton.enough; // a tangent ray
-            if (!settled)
-                hit.doubt = min(hit.doubt, newton.box_past);
-        }
-        if (!settled && step == kNewtonSteps - 1)
-            return grazing;
+        vec2 to = vec2(kept_near(next.uv.x, rectangle.middle.x, rectangle.half_side.x),
+                       kept_near(next.uv.y, rectangle.middle.y, rectangle.half_side.y));
+        if (newton_stuck(next, uv, to))
+            break;
+        search.uv = to;
     }
-    return grazing;
+    // one root at most in a rectangle as large as to hold it
+    float off = max(farther(search.uv - rectangle.middle, rectangle.half_side), 1.0f);
+    vec2 blur = root_blur(search.seen, newton.rounding);
+    bool sharp = max(blur.x, blur.y) <= kNewtonOutside;
+    search.complete = none || (search.settled && sharp && rectangle.bend * off < kOneRoot);
+    return search;
+}
+
+// What a search ended at; accepted anywhere on the patch, so that leaves leave no gaps
+void offer_end(PatchRay ray, PatchRecord patch, FaceRecord face, NewtonPatch newton, Search search, uint leaf,
+               uint instance, bool rims, inout Hit hit)
+{
+    if (!search.settled)
+        return;
+    NewtonRoot root = newton_root(search.s, search.next, search.uv, search.exact, ray.origin, ray.direction);
+    vec2 off = abs(root.uv - 0.5f) - patch_overlap(root_blur(search.seen, newton.rounding));
+    if (max(off.x, off.y) > 0.5f || !in_range(ray, root.t, hit))
+        return;
+    bool back = false;
+    if (rims) {
+        vec2 within = clamp(search.uv, 0.0f, 1.0f); // beyond a pole's side a patch is turned inside out
+        SurfacePoint s = search.s;
+        if (within != search.uv)
+            s = evaluate(newton, within);
+        back = dot(ray.direction, outward(patch, face, cross(s.du, s.dv))) > 0.0f;
+    }
+    offer(ray, patch.face, face, leaf, instance, root.t, root.uv, face_uv(patch, kKindBezier, root.uv), back, hit);
 }
 
 #include "shaders/stochastic.glsl"
 
-// Newton from the leaf's middle, and from its other starts where it may hold more roots than one
+// Parts of a leaf are numbered by their places in the parts before: 4 bits a depth, below them the depth
+const uint kDepthBits = 2u;
+
+vec2 part_middle(LeafPlane leaf, uint part)
+{
+    vec2 middle = leaf.middle;
+    int depth = int(part & 3u);
+    for (int i = 1; i <= depth; ++i) {
+        uint place = part >> (kDepthBits + 4u * uint(depth - i));
+        vec2 off = 2.0f * vec2(float(place & 3u), float(place >> 2u & 3u)) - 3.0f;
+        middle += split_share(i) * leaf.half_side * off;
+    }
+    return middle;
+}
+
+// Offers all roots in the leaf, found by splitting it. False: there may be more.
+bool split(PatchRay ray, PatchRecord patch, FaceRecord face, NewtonPatch newton, LeafPlane plane, uint leaf,
+           uint instance, bool rims, inout Hit hit)
+{
+    uint stack[16 * kDeepestSplit];
+    int waiting = 1;
+    bool all = true;
+    stack[0] = 0u;
+    for (int count = 0; waiting > 0; ++count) {
+        if (count == kMostSplits)
+            return false;
+        uint part = stack[--waiting];
+        int depth = int(part & 3u) + 1;
+        bool last = depth == kDeepestSplit || plane.along >= kHuge; // then nothing is ever proved
+        Rectangle rectangle;
+        rectangle.half_side = plane.half_side * split_share(depth);
+        rectangle.size = plane.size * split_share(depth);
+        for (uint place = 0u; place < 16u; ++place) {
+            if (iteration_limit > 0u && iterations + uint(kNewtonSteps + 2) * newton.work > split_iterations())
+                return false;
+            iterations += 1u + uint(depth);
+            uint child = ((part >> kDepthBits << 4u | place) << kDepthBits) | uint(depth);
+            rectangle.middle = part_middle(plane, child);
+            SurfacePoint s = evaluate(newton, rectangle.middle);
+            SeenPoint seen = seen_point(s, newton.planes);
+            ++newton_steps;
+            if (passes_by(plane, newton.planes, s, seen, split_share(depth), newton.rounding))
+                continue;
+            rectangle.bend = bend_around(plane, newton.planes, seen, split_share(depth));
+            bool complete = false;
+            if (rectangle.bend < kOneRoot || last || depth == 1) {
+                Search search = find_root(newton, plane, rectangle, s, seen);
+                offer_end(ray, patch, face, newton, search, leaf, instance, rims, hit);
+                complete = search.complete;
+            }
+            if (!complete && last)
+                all = false;
+            else if (!complete)
+                stack[waiting++] = child;
+        }
+    }
+    return all;
+}
+
+// All roots in the leaf, where its bend allows a proof that they are all
 void bezier_hit(PatchRay ray, PatchRecord patch, FaceRecord face, LeafBox box, float box_past, uint leaf, uint instance,
                 bool rims, inout Hit hit)
 {
     NewtonPatch newton;
-    newton.degree_u = (patch.shape >> 8) & 0xffu;
-    newton.degree_v = (patch.shape >> 16) & 0xffu;
+    uint degree_u = (patch.shape >> 8) & 0xffu;
+    uint degree_v = (patch.shape >> 16) & 0xffu;
+    newton.first_control_point = patch.first_control_point;
+    newton.degree_u = int(degree_u);
+    newton.degree_v = int(degree_v);
     newton.rational = has_feature(kFeatureRational) && (patch.shape & kShapeRational) != 0u;
     if (local_floats > 0u)
-        copy_control_points(patch, (newton.degree_u + 1u) * (newton.degree_v + 1u) * (newton.rational ? 4u : 3u));
+        copy_control_points(patch, (degree_u + 1u) * (degree_v + 1u) * (newton.rational ? 4u : 3u));
     newton.planes = ray_planes(ray.origin, ray.direction);
     newton.enough = last_residual(view.error_px * ray.pixel);
-    newton.box_past = box_past;
-    newton.work = 1u + bezier_iterations(newton.degree_u, newton.degree_v);
-    newton.rims = rims;
+    newton.rounding = patch_rounding(newton.degree_u, newton.degree_v);
+    newton.work = 1u + bezier_iterations(degree_u, degree_v);
     if (has_feature(kFeatureStochastic)) {
-        newton_once(ray, patch, face, box, newton, leaf, instance, hit);
+        newton_once(ray, patch, face, box, newton, leaf, instance, rims, hit);
         return;
     }
-    vec2 uv = 0.5f * (box.uv_lo + box.uv_hi);
-    bool again = box.along >= 0.5f;
-    for (int start = 0; start <= kMoreStarts; ++start) {
-        if (start > 0 && iteration_limit > 0u && iterations + uint(kNewtonSteps + 1) * newton.work > kRoundIterations) {
-            hit.doubt = min(hit.doubt, box_past);
+    SurfacePoint s = evaluate(newton, leaf_middle(box));
+    LeafPlane plane = leaf_plane(box, s.p, s.du, s.dv);
+    SeenPoint seen = seen_point(s, newton.planes);
+    Rectangle whole = Rectangle(plane.middle, plane.half_side, plane.size, middle_bend(plane, seen));
+    if (whole.bend < kOneRoot) {
+        Search search = find_root(newton, plane, whole, s, seen);
+        offer_end(ray, patch, face, newton, search, leaf, instance, rims, hit);
+        if (search.complete)
             return;
-        }
-        bool grazing = newton_from(ray, patch, face, box, newton, uv, leaf, instance, hit);
-        if (start == 0)
-            again = again || grazing;
-        if (!again)
-            return;
-        uv = newton_start(start, box.uv_lo, box.uv_hi);
+    } else if (passes_by(plane, newton.planes, s, seen, 1.0f, newton.rounding))
+        return;
+    if (box_past >= hit.past + ray.slack)
+        return;
+    if (iteration_limit > 0u && view.alone == 0u) {
+        overrun = true; // lanes would split at different places, and their loops add up: alone, then
+        return;
     }
+    if (!split(ray, patch, face, newton, plane, leaf, instance, rims, hit))
+        hit.doubt = min(hit.doubt, min(box_past, hit.past)); // it may lie a little before its box, on the next leaf
 }
 
 void leaf_hit(uint leaf, uint instance_index, FrameInstance instance, vec2 pixel, inout Hit hit)

@@ -16,8 +16,8 @@
 #include "shaders/shared/edge.h"
 #include "shaders/shared/language.h"
 #include "shaders/shared/leaf_box.h"
+#include "shaders/shared/leaf_proof.h"
 #include "shaders/shared/leaf_start.h"
-#include "shaders/shared/patch_newton.h"
 #include "shaders/shared/precision.h"
 #include "shaders/shared/quadric.h"
 #include "shaders/shared/rim.h"
@@ -119,8 +119,6 @@ float hit_tau(Hit hit)
     return hit.past < kHuge ? tau + 4.0f * kRounding * abs(tau) : kHuge;
 }
 
-uint group_iterations = 0u; // of the whole subgroup, whose lanes share the driver's limit
-
 // Walks the trees until nothing nearer can wait. Returns false where the driver's loop limit would have cut it short.
 bool walk(vec2 pixel, vec3 across, inout Hit hit)
 {
@@ -198,7 +196,7 @@ vec3 world_normal(Hit hit, FrameInstance instance, PatchRecord patch, FaceRecord
     vec3 p = ray.origin + hit.t * ray.direction;
     vec3 n;
     if (kind == kKindBezier && has_kind(kKindBezier))
-        n = bezier_normal(patch, hit.uv_patch);
+        n = bezier_normal(patch, clamp(hit.uv_patch, 0.0f, 1.0f)); // beyond a pole's side a patch is turned inside out
     else
         n = native_normal(kind, patch, p);
     n = combine(vector(patch.axis_x), vector(patch.axis_y), vector(patch.axis_z), outward(patch, face, n));
@@ -242,8 +240,7 @@ FramePixel hit_pixel(Hit hit, vec2 pixel, vec3 across)
     result.uv_face = float[2](hit.uv_face.x, hit.uv_face.y);
     result.face = patch.face;
     result.instance = hit.instance;
-    bool flagged = bend_value(leaf.quat_z_bend >> 16 & 0xffu) >= 0.5f;
-    result.status = kPixelHit | (flagged || hit.doubt <= hit.past ? 0u : kPixelCertified);
+    result.status = kPixelHit | (hit.doubt <= hit.past ? 0u : kPixelCertified);
     result.rgba = float[4](0.0f, 0.0f, 0.0f, 1.0f);
     if (has_feature(kFeatureShade)) {
         uint rgba = instance.color_rgba >> 24 != 0u ? instance.color_rgba : kDefaultColor;

@@ -18,34 +18,33 @@ void store_kept(uint pixel, Hit hit)
 // Plain Newton from the frame's start in the leaf: ends where a step began within newton.enough of its ray, after
 // kNewtonSteps, or at the bounds of its leaf's reach
 void newton_once(PatchRay ray, PatchRecord patch, FaceRecord face, LeafBox box, NewtonPatch newton, uint leaf,
-                 uint instance, inout Hit hit)
+                 uint instance, bool rims, inout Hit hit)
 {
-    vec2 uv = leaf_start(vec2(view.start[0], view.start[1]), box.uv_lo, box.uv_hi);
-    bool settled = false;
+    Search search;
+    search.settled = false;
+    search.exact = false;
+    search.uv = leaf_start(vec2(view.start[0], view.start[1]), box.uv_lo, box.uv_hi);
+    vec2 middle = leaf_middle(box);
+    vec2 half_side = leaf_half_side(box);
     for (int step = 0; step <= kNewtonSteps; ++step) {
-        SurfacePoint s =
-            bezier_point(patch.first_control_point, int(newton.degree_u), int(newton.degree_v), newton.rational, uv);
-        NewtonStep next = newton_step(s, newton.planes, uv);
-        iterations += newton.work;
-        if (settled) {
-            // not `precise`: glslc follows precise values around this loop for ever
-            float t = dot(s.p - ray.origin, ray.direction) / dot(ray.direction, ray.direction);
-            vec2 overlap = patch_overlap(s, newton.planes, patch_rounding(int(newton.degree_u), int(newton.degree_v)));
-            vec2 off = abs(uv - 0.5f) - overlap;
-            if (max(off.x, off.y) <= 0.5f && next.residual <= newton.enough && in_range(ray, t, hit)) {
-                bool back = newton.rims && dot(ray.direction, outward(patch, face, cross(s.du, s.dv))) > 0.0f;
-                offer(ray, patch.face, face, leaf, instance, t, uv, face_uv(patch, kKindBezier, uv), back, hit);
-            }
+        search.s = evaluate(newton, search.uv);
+        search.seen = seen_point(search.s, newton.planes);
+        search.next = newton_step(search.seen, search.uv);
+        bool close = search.next.residual <= newton.enough;
+        if (search.settled) {
+            search.settled = close;
+            search.next.uv = search.uv; // no step more
+            offer_end(ray, patch, face, newton, search, leaf, instance, rims, hit);
             return;
         }
         if (step == kNewtonSteps)
             return;
         ++newton_steps;
-        settled = next.residual <= newton.enough;
-        vec2 to = vec2(kept_near_leaf(next.uv.x, box.uv_lo.x, box.uv_hi.x),
-                       kept_near_leaf(next.uv.y, box.uv_lo.y, box.uv_hi.y));
-        if (!settled && newton_stuck(next, uv, to))
+        search.settled = close;
+        vec2 to = vec2(kept_near(search.next.uv.x, middle.x, half_side.x),
+                       kept_near(search.next.uv.y, middle.y, half_side.y));
+        if (!close && newton_stuck(search.next, search.uv, to))
             return;
-        uv = to;
+        search.uv = to;
     }
 }

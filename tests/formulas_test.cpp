@@ -153,6 +153,39 @@ std::vector<long double> torus_by_steps(long double R, long double r, const long
     return roots;
 }
 
+TEST(formulas, lines_that_touch_within_rounding_are_told_and_no_others)
+{
+    // beside (x, y = -2, z) along y, `off` of the radius inside or outside of the line that touches
+    const real none = real(0.0f);
+    const auto told = [&](float off, auto roots_at) {
+        return values(roots_at(real(0.8125f * (1 + off))).touch).at[0] < kHuge;
+    };
+    const real3 along(none, real(1.0f), none);
+    const auto beside = [&](real x) { return real3(x, real(-2.0f), none); };
+    const auto cylinder = [&](real x) { return cylinder_roots(0.8125f, beside(x), along); };
+    const auto cone = [&](real x) { return cone_roots(0.8125f, 0.375f, beside(x), along); };
+    const auto sphere = [&](real x) { return sphere_roots(0.8125f, beside(x), along); };
+    // at the outer rim, along the axis: R + r = 0.8125
+    const auto torus = [&](real x) {
+        return torus_roots(0.5f, 0.3125f, real3(x, none, real(-2.0f)), real3(none, none, real(1.0f)));
+    };
+    for (const float off : {0.0f, 1.2e-7f, -1.2e-7f}) {
+        EXPECT_TRUE(told(off, cylinder)) << off;
+        EXPECT_TRUE(told(off, cone)) << off;
+        EXPECT_TRUE(told(off, sphere)) << off;
+        EXPECT_TRUE(told(off, torus)) << off;
+    }
+    for (const float off : {2e-5f, -2e-5f, 1e-2f, -1e-2f}) {
+        EXPECT_FALSE(told(off, cylinder)) << off;
+        EXPECT_FALSE(told(off, cone)) << off;
+        EXPECT_FALSE(told(off, sphere)) << off;
+        EXPECT_FALSE(told(off, torus)) << off;
+    }
+    EXPECT_LT(values(plane_roots(real3(none, none, none), along).touch).at[0], kHuge);
+    EXPECT_EQ(values(plane_roots(real3(none, none, real(1e-4f)), along).touch).at[0], kHuge);
+    EXPECT_EQ(values(plane_roots(real3(none, none, none), real3(none, real(1.0f), real(1e-4f))).touch).at[0], kHuge);
+}
+
 TEST(formulas, torus_roots_are_all_found_in_order)
 {
     RandomRays rays;

@@ -231,6 +231,11 @@ FN integer operator<<(integer a, integer b)
     TRIMRAY_EACH_PART r.v[i] = hn::Shl(a.v[i], b.v[i]);
     return r;
 }
+/// The lanes whose bits are set.
+FN mask lanes_of(uint bits)
+{
+    return ((integer(bits) >> lane_numbers()) & integer(1u)) == integer(1u);
+}
 FN integer to_integer(real x)
 {
     integer r;
@@ -353,6 +358,10 @@ struct real3 {
     HWY_INLINE real3(real x_, real y_, real z_) : x(x_), y(y_), z(z_) {}
     HWY_INLINE real3(scalar3 s) : x(s.x), y(s.y), z(s.z) {}
 };
+FN scalar3 first_lane(real3 a)
+{
+    return scalar3(hn::GetLane(a.x.v[0]), hn::GetLane(a.y.v[0]), hn::GetLane(a.z.v[0]));
+}
 FN scalar3 operator+(scalar3 a, scalar3 b)
 {
     return scalar3(a.x + b.x, a.y + b.y, a.z + b.z);

@@ -71,6 +71,16 @@ FN LeafBox decode_leaf(LeafRecord leaf)
     return box;
 }
 
+// Of the leaf's rectangle, uv_patch
+FN scalar2 leaf_middle(LeafBox box)
+{
+    return scalar2(0.5f * (box.uv_lo.x + box.uv_hi.x), 0.5f * (box.uv_lo.y + box.uv_hi.y));
+}
+FN scalar2 leaf_half_side(LeafBox box)
+{
+    return scalar2(0.5f * (box.uv_hi.x - box.uv_lo.x), 0.5f * (box.uv_hi.y - box.uv_lo.y));
+}
+
 struct BoxHit {
     real near; // entry and exit along the line, not cut at the ray's start
     real far;

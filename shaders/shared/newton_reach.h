@@ -14,7 +14,7 @@ SHARED_OPEN
 // How far Newton's iterates may leave the leaf that they started in, in half sides from its middle: farther roots are
 // other leaves' to find. And how far they may leave the patch, in uv_patch: a rational patch has poles outside.
 const scalar kNewtonReach = 2.0f;
-const scalar kNewtonOutside = 1e-3f;
+const scalar kNewtonOutside = 0.03125f;
 
 // How far across the ray a point of a patch may lie from where it should, patch units, |q| <= 1: its control points are
 // rounded to 2^-22 (2^-23 off at most), each of the degree_u + degree_v levels of its evaluation rounds twice, and a

@@ -35,79 +35,111 @@ FN RayPlanes ray_planes(real3 origin, real3 direction)
     return planes;
 }
 
-// Sine of the angle between a ray and a surface below which a leaf that turns by LeafOptions.max_turning_rad can hold
-// two roots.
-const scalar kGrazing = 0.15f;
-
 const int kNewtonSteps = 12;
-// Rounding of a point with |q| about 1, patch units: a point so near its ray is on it. A step from a larger residual
-// ends within its square times the leaf's curvature: from kLargestLastResidual within 6e-8, below rounding.
-const scalar kSmallResidual = 4e-6f;
+// A step from a larger residual ends within its square times the leaf's curvature: from kLargestLastResidual within
+// 6e-8, below rounding. What is less than kLeastLastResidual (patch units) asks for no further step either.
+const scalar kLeastLastResidual = 4e-6f;
 const scalar kLargestLastResidual = 2.4e-4f;
 
-// The residual below which one more step ends the iteration. `error`: asked for, patch units
+// The residual from which a last step is taken, where it is proved to end within rounding. `error`: asked for, patch
+// units.
 FN scalar last_residual(scalar error)
 {
-    return min(max(error, kSmallResidual), kLargestLastResidual);
+    return min(max(error, kLeastLastResidual), kLargestLastResidual);
 }
 
-// Where a leaf may hold more roots than one, Newton starts in its middle and then at these places, 0 to 3
-FN scalar2 newton_start(int index, scalar2 leaf_lo, scalar2 leaf_hi)
-{
-    scalar s = index == 0 || index == 2 ? 0.1f : 0.9f;
-    scalar t = index == 0 || index == 3 ? 0.1f : 0.9f;
-    return scalar2(leaf_lo.x + s * (leaf_hi.x - leaf_lo.x), leaf_lo.y + t * (leaf_hi.y - leaf_lo.y));
-}
-const int kMoreStarts = 4;
+// Where rounding of uv alone moves a point farther than this (patch units), beside control points 10^3 times as heavy
+// as others, single precision has no answer.
+const scalar kMostBlur = 1e-4f;
 
-struct NewtonStep {
-    real2 uv;      // after the step; may leave [0,1]^2, the caller decides
-    real residual; // before the step: distance of the point from the ray, patch units
-    mask singular; // the step was not taken
-    mask grazing;  // the ray and the surface meet at less than kGrazing: more roots may be near
+// A point of a patch and its derivatives as its ray sees them: across the ray, along n1 and n2
+struct SeenPoint {
+    real2 r; // from the ray to the point; its length is the residual
+    real2 du;
+    real2 dv;
+    real det; // of the Jacobian [du dv]
 };
 
-// One step. Source: Kajiya 1982; Cramer's rule.
-FN NewtonStep newton_step(SurfacePoint s, RayPlanes ray, real2 uv)
+FN SeenPoint seen_point(SurfacePoint s, RayPlanes ray)
 {
     PRECISE real r1 = dot(ray.n1, s.p) + ray.d1;
     PRECISE real r2 = dot(ray.n2, s.p) + ray.d2;
-    PRECISE real a1 = dot(ray.n1, s.du); // columns of the Jacobian
+    PRECISE real a1 = dot(ray.n1, s.du);
     PRECISE real a2 = dot(ray.n2, s.du);
     PRECISE real b1 = dot(ray.n1, s.dv);
     PRECISE real b2 = dot(ray.n2, s.dv);
     PRECISE real det = a1 * b2 - b1 * a2;
+    SeenPoint seen;
+    seen.r = real2(r1, r2);
+    seen.du = real2(a1, a2);
+    seen.dv = real2(b1, b2);
+    seen.det = det;
+    return seen;
+}
+
+struct NewtonStep {
+    real2 uv;      // after the step; may leave [0,1]^2, the caller decides
+    real residual; // before the step: distance of the point from the ray, patch units
+    real blur;     // by how much rounding of uv alone moves the point, patch units; kMostBlur at most
+    mask singular; // the step was not taken
+};
+
+// One step. Source: Kajiya 1982; Cramer's rule.
+FN NewtonStep newton_step(SeenPoint s, real2 uv)
+{
+    real along_u = length(s.du);
+    real along_v = length(s.dv);
     // rounding alone gives |det| a few eps of |R_u| |R_v|: below that its sign means nothing
-    PRECISE real noise = 8.0f * kRounding * sqrt((a1 * a1 + a2 * a2) * (b1 * b1 + b2 * b2));
+    PRECISE real noise = 8.0f * kRounding * (along_u * along_v);
     NewtonStep next;
-    next.singular = abs(det) <= noise;
-    next.grazing = det * det <= kGrazing * kGrazing * dot(s.du, s.du) * dot(s.dv, s.dv);
-    PRECISE real per_det = 1.0f / select(next.singular, real(1.0f), det);
-    next.residual = sqrt(r1 * r1 + r2 * r2);
-    real2 moved = real2(uv.x - (b2 * r1 - b1 * r2) * per_det, uv.y - (a1 * r2 - a2 * r1) * per_det);
+    next.blur = min(kRounding * (along_u + along_v), real(kMostBlur));
+    next.singular = abs(s.det) <= noise;
+    PRECISE real per_det = 1.0f / select(next.singular, real(1.0f), s.det);
+    next.residual = length(s.r);
+    real2 moved =
+        real2(uv.x - (s.dv.y * s.r.x - s.dv.x * s.r.y) * per_det, uv.y - (s.du.x * s.r.y - s.du.y * s.r.x) * per_det);
     next.uv = select(next.singular, uv, moved);
     return next;
 }
 
-FN real kept_near_leaf(real u, scalar leaf_lo, scalar leaf_hi)
+FN real kept_near(real u, real middle, scalar half_side)
 {
-    scalar middle = 0.5f * (leaf_lo + leaf_hi);
-    scalar reach = kNewtonReach * (middle - leaf_lo);
-    return clamp(u, real(max(middle - reach, -kNewtonOutside)), real(min(middle + reach, 1.0f + kNewtonOutside)));
+    scalar reach = kNewtonReach * half_side;
+    return clamp(u, max(middle - reach, real(-kNewtonOutside)), min(middle + reach, real(1.0f + kNewtonOutside)));
 }
 
 // How far outside of its patch a root may be and belong to it, in uv_patch: as far as `rounding` may have moved it, so
 // that both neighbours reach their common side whatever the patch's shape and the ray's slant. With R_u, R_v the
-// Jacobian's columns, an error of length e moves the root by at most (e |R_v|, e |R_u|) / |det|.
-FN real2 patch_overlap(SurfacePoint s, RayPlanes ray, scalar rounding)
+// Jacobian's columns, an error of length e moves the root by at most (e |R_v|, e |R_u|) / |det|. Not cut at
+// kNewtonOutside.
+FN real2 root_blur(SeenPoint s, scalar rounding)
 {
-    real a1 = dot(ray.n1, s.du);
-    real a2 = dot(ray.n2, s.du);
-    real b1 = dot(ray.n1, s.dv);
-    real b2 = dot(ray.n2, s.dv);
-    real per_det = rounding / max(abs(a1 * b2 - b1 * a2), real(1e-20f));
-    return real2(min(per_det * sqrt(b1 * b1 + b2 * b2), real(kNewtonOutside)),
-                 min(per_det * sqrt(a1 * a1 + a2 * a2), real(kNewtonOutside)));
+    real per_det = rounding / max(abs(s.det), real(1e-20f));
+    return real2(per_det * length(s.dv), per_det * length(s.du));
+}
+
+FN real2 patch_overlap(real2 blur)
+{
+    return real2(min(blur.x, real(kNewtonOutside)), min(blur.y, real(kNewtonOutside)));
+}
+
+// A root and its distance along the ray
+struct NewtonRoot {
+    real2 uv;
+    real t;
+};
+
+// What a last step makes of the point it starts from: its derivatives tell where it ends. Unless it is `proved` to end
+// within rounding, a step longer than 1e-3 (patch units) would change the residual by more, and is not taken.
+FN NewtonRoot newton_root(SurfacePoint s, NewtonStep next, real2 uv, mask proved, real3 origin, real3 direction)
+{
+    real3 moved = s.du * (next.uv.x - uv.x) + s.dv * (next.uv.y - uv.y);
+    mask taken = proved || dot(moved, moved) <= 1e-6f;
+    NewtonRoot root;
+    root.uv = select(taken, next.uv, uv);
+    real3 p = select(taken, s.p + moved, s.p);
+    root.t = dot(p - origin, direction) / dot(direction, direction);
+    return root;
 }
 
 // A step from uv to `to`, shorter than this (uv_patch) because it was cut: the patch's rounding, |S_u| and |S_v| about

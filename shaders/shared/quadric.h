@@ -12,11 +12,22 @@
 
 SHARED_OPEN
 
-// Roots t0 <= t1 in units of the direction's length; both kHuge where there are none.
+// Roots t0 <= t1 in units of the direction's length; both kHuge where there are none. `touch`: where the line touches
+// the surface so nearly that rounding decides whether there are roots; kHuge: it does not.
 struct RootPair {
     real t0;
     real t1;
+    real touch;
 };
+
+// How far from where it should a line may lie, for each unit of its origin's and its surface's size: the origin's sum
+// of four terms, the direction's of three, and the six operations of a moment
+const scalar kTouching = 16.0f * kRounding;
+
+FN real touching_reach(scalar size, real3 origin)
+{
+    return kTouching * (size + abs(origin.x) + abs(origin.y) + abs(origin.z));
+}
 
 // Below this share of the direction's length a component counts as zero: a root would lie 2^40 sizes away
 const scalar kParallel = 9.0949470e-13f;
@@ -26,6 +37,7 @@ FN RootPair no_roots_unless(mask real_roots, real t0, real t1)
     RootPair roots;
     roots.t0 = select(real_roots, min(t0, t1), real(kHuge));
     roots.t1 = select(real_roots, max(t0, t1), real(kHuge));
+    roots.touch = real(kHuge);
     return roots;
 }
 
@@ -37,6 +49,10 @@ FN RootPair plane_roots(real3 origin, real3 direction)
     RootPair roots;
     roots.t0 = select(crosses, t, real(kHuge));
     roots.t1 = real(kHuge);
+    // in the plane: anywhere
+    mask lies_in = abs(direction.z) <= kTouching * (abs(direction.x) + abs(direction.y)) &&
+                   abs(origin.z) <= touching_reach(1.0f, origin);
+    roots.touch = select(lies_in, real(-kHuge), real(kHuge));
     return roots;
 }
 
@@ -52,7 +68,10 @@ FN RootPair cylinder_roots(scalar r, real3 origin, real3 direction)
     PRECISE real half2 = (r * n - m) * (r * n + m); // (half chord * n)^2
     PRECISE real middle = -(origin.x * direction.x + origin.y * direction.y);
     PRECISE real half_chord = sqrt(max(half2, real(0.0f)));
-    return no_roots_unless(crosses && half2 >= 0.0f, (middle - half_chord) / n2, (middle + half_chord) / n2);
+    RootPair roots = no_roots_unless(crosses && half2 >= 0.0f, (middle - half_chord) / n2, (middle + half_chord) / n2);
+    mask touches = crosses && abs(r * n - m) <= n * touching_reach(r, origin);
+    roots.touch = select(touches, (middle - half_chord) / n2, real(kHuge));
+    return roots;
 }
 
 // x^2 + y^2 + z^2 = r^2, from the point of the line nearest to the centre
@@ -64,7 +83,9 @@ FN RootPair sphere_roots(scalar r, real3 origin, real3 direction)
     PRECISE real d = length(nearest);
     PRECISE real half2 = (r - d) * (r + d);
     PRECISE real half_chord = sqrt(max(half2, real(0.0f)) / n2);
-    return no_roots_unless(half2 >= 0.0f, middle - half_chord, middle + half_chord);
+    RootPair roots = no_roots_unless(half2 >= 0.0f, middle - half_chord, middle + half_chord);
+    roots.touch = select(abs(r - d) <= touching_reach(r, origin), middle - half_chord, real(kHuge));
+    return roots;
 }
 
 // One Newton step of a root of the cone towards hypot(x, y) = |rho|, rho = r + z tan a, which cancels less than the
@@ -117,6 +138,11 @@ FN RootPair cone_roots(scalar r, scalar tan_a, real3 origin, real3 direction)
     RootPair roots;
     roots.t0 = min(first, second);
     roots.t1 = max(first, second);
+    // b^2 - a c loses what its terms' own sums of squares lose
+    PRECISE real squares = (direction.x * direction.x + direction.y * direction.y + rho_t * rho_t) *
+                           (origin.x * origin.x + origin.y * origin.y + rho * rho);
+    mask touches = has_first && abs(discriminant) <= 2.0f * kTouching * squares;
+    roots.touch = select(touches, select(some, roots.t0, -b / select(has_first, a, real(1.0f))), real(kHuge));
     return roots;
 }
 

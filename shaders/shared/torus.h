@@ -12,6 +12,7 @@
 #endif
 
 #include "shaders/shared/language.h"
+#include "shaders/shared/quadric.h"
 
 SHARED_OPEN
 
@@ -20,6 +21,7 @@ struct TorusRoots {
     real t1;
     real t2;
     real t3;
+    real touch; // where the line touches so nearly that rounding decides whether there are roots; kHuge: nowhere
 };
 
 // Value and derivative of (hypot(x, y) - R)^2 + z^2 - r^2 along a ray, times the same with -R for spindle tori, whose
@@ -83,13 +85,13 @@ FN_LARGE real cubic_root_between(real c3, real c2, real c1, real c0, real lo, re
     return select(found, t, hi);
 }
 
-// The torus's root in [lo, hi], where its sign changes once; kHuge where it does not change.
-FN_LARGE real torus_root_between(scalar R, scalar r, real3 origin, real3 direction, real lo, real hi)
+// The torus's root in [lo, hi], where its sign changes once; kHuge where it does not change. The values at both ends
+// are given.
+FN_LARGE real torus_root_between(scalar R, scalar r, real3 origin, real3 direction, real lo, real hi, real at_lo,
+                                 real at_hi)
 {
-    ValueSlope at_lo = torus_value(R, r, origin, direction, lo);
-    ValueSlope at_hi = torus_value(R, r, origin, direction, hi);
-    mask found = differ(at_lo.value < 0.0f, at_hi.value < 0.0f) && lo < hi;
-    mask rising = at_lo.value < at_hi.value;
+    mask found = differ(at_lo < 0.0f, at_hi < 0.0f) && lo < hi;
+    mask rising = at_lo < at_hi;
     real a = lo;
     real b = hi;
     real t = 0.5f * (lo + hi);
@@ -133,16 +135,28 @@ FN_LARGE TorusRoots torus_roots(scalar R, scalar r, real3 origin, real3 directio
     real e1 = cubic_root_between(one, none, q1, q0, -s_end, -turn);
     real e2 = cubic_root_between(one, none, q1, q0, -turn, turn);
     real e3 = cubic_root_between(one, none, q1, q0, turn, s_end);
-    real s0 = torus_root_between(R, r, p, d, -s_end, e1);
-    real s1 = torus_root_between(R, r, p, d, e1, e2);
-    real s2 = torus_root_between(R, r, p, d, e2, e3);
-    real s3 = torus_root_between(R, r, p, d, e3, s_end);
+    real f_start = torus_value(R, r, p, d, -s_end).value;
+    real f1 = torus_value(R, r, p, d, e1).value;
+    real f2 = torus_value(R, r, p, d, e2).value;
+    real f3 = torus_value(R, r, p, d, e3).value;
+    real f_end = torus_value(R, r, p, d, s_end).value;
+    real s0 = torus_root_between(R, r, p, d, -s_end, e1, f_start, f1);
+    real s1 = torus_root_between(R, r, p, d, e1, e2, f1, f2);
+    real s2 = torus_root_between(R, r, p, d, e2, e3, f2, f3);
+    real s3 = torus_root_between(R, r, p, d, e3, s_end, f3, f_end);
+    // A value is about 2 r times the distance from the surface, and of spindle tori up to (2 reach)^2 times that: where
+    // it turns within rounding of 0 there may be two roots or none, from the root before it on
+    PRECISE real small = 2.0f * r * (r > R ? 4.0f * reach * reach : 1.0f) * touching_reach(reach, p);
+    real touch = select(abs(f3) <= small, min(s2, e3), real(kHuge));
+    touch = select(abs(f2) <= small, min(s1, e2), touch);
+    touch = select(abs(f1) <= small, min(s0, e1), touch);
     TorusRoots roots;
     PRECISE real per_length = 1.0f / speed;
     roots.t0 = select(near_enough && s0 < kHuge, (middle + s0) * per_length, real(kHuge));
     roots.t1 = select(near_enough && s1 < kHuge, (middle + s1) * per_length, real(kHuge));
     roots.t2 = select(near_enough && s2 < kHuge, (middle + s2) * per_length, real(kHuge));
     roots.t3 = select(near_enough && s3 < kHuge, (middle + s3) * per_length, real(kHuge));
+    roots.touch = select(near_enough && touch < kHuge, (middle + touch) * per_length, real(kHuge));
     return roots;
 }
 

@@ -1,0 +1,185 @@
+// What the bounds of a leaf's bend (format/leaf_bend.h) prove about the roots of a ray in it: that there is none, that
+// there is one at most, and that a Newton step ends within rounding of one.
+//
+// A ray sees the leaf through the map F = P S of the plane, P the projection along the ray. With DS_0 the derivative at
+// the leaf's middle and |R .| the length of a vector of uv_patch on the plane of DS_0, the ray's bend k of a rectangle
+// around a point c is a bound of |(P DS_c)^-1 (P DS_a - P DS_b)| in that norm, for a and b as far apart as the
+// rectangle's half sides. Then, d being Newton's step from c,
+// - a root x of the rectangle lies within k / 2 |R (x - c)| of c + d;
+// - if k < 1 there is one root at most;
+// - if k |d| <= 1/2, |d| in half sides, there is a root within k |d| |R d| of c + d.
+// Source: Krawczyk 1969; Kantorovich's theorem (Ortega & Rheinboldt 12.6); the contraction mapping theorem (5.1).
+#if defined(TRIMRAY_SHARED_LEAF_PROOF_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef TRIMRAY_SHARED_LEAF_PROOF_H
+#undef TRIMRAY_SHARED_LEAF_PROOF_H
+#else
+#define TRIMRAY_SHARED_LEAF_PROOF_H
+#endif
+
+#include "shaders/shared/leaf_box.h"
+#include "shaders/shared/patch_newton.h"
+
+SHARED_OPEN
+
+// The leaf at its middle, the same for all rays
+struct LeafPlane {
+    scalar3 p; // S, S_u, S_v there, patch units
+    scalar3 du;
+    scalar3 dv;
+    scalar3 normal; // unit
+    scalar3 axis;   // unit, along S_u
+    scalar2 middle; // uv_patch
+    scalar2 half_side;
+    scalar2 per_length; // u and v of a vector are at most these times its length on the plane
+    scalar area;        // |S_u x S_v|
+    scalar size;        // the longest way on the plane from the middle to a corner
+    scalar along;       // LeafBend; kHuge: nothing is known
+    scalar across;
+};
+
+FN LeafPlane leaf_plane(LeafBox box, scalar3 p, scalar3 du, scalar3 dv)
+{
+    LeafPlane leaf;
+    leaf.p = p;
+    leaf.du = du;
+    leaf.dv = dv;
+    leaf.middle = leaf_middle(box);
+    leaf.half_side = leaf_half_side(box);
+    scalar3 n = cross(du, dv);
+    scalar long_u = sqrt(dot(du, du));
+    scalar long_v = sqrt(dot(dv, dv));
+    leaf.area = sqrt(dot(n, n));
+    bool no_plane = leaf.area <= 1e-6f * long_u * long_v || leaf.area <= 0.0f;
+    scalar per_area = no_plane ? 0.0f : 1.0f / leaf.area;
+    leaf.normal = n * per_area;
+    leaf.axis = du * (no_plane ? 0.0f : 1.0f / long_u);
+    leaf.per_length = scalar2(long_v * per_area, long_u * per_area);
+    scalar3 to_u = du * leaf.half_side.x;
+    scalar3 to_v = dv * leaf.half_side.y;
+    leaf.size = max(sqrt(dot(to_u + to_v, to_u + to_v)), sqrt(dot(to_u - to_v, to_u - to_v)));
+    leaf.along = no_plane ? kHuge : box.along;
+    leaf.across = no_plane ? kHuge : box.across;
+    return leaf;
+}
+
+// A rectangle's bend below which it holds one root at most, with room for the rounding of the bend itself
+const scalar kOneRoot = 0.99f;
+// What stands for a bend beyond every proof
+const scalar kMostBend = 1e4f;
+
+// A leaf that leaves something open is split, 4 x 4 parts at a time, so often, and parts of parts so many times
+const int kDeepestSplit = 3;
+const int kMostSplits = 24;
+
+FN scalar split_share(int depth)
+{
+    return depth == 1 ? 0.25f : (depth == 2 ? 0.0625f : 0.015625f);
+}
+
+// The ray's bend of the leaf around its middle: along + across / tan b, b the ray's slope against the leaf's plane
+FN real middle_bend(LeafPlane leaf, SeenPoint middle)
+{
+    real sine = abs(middle.det);
+    real cosine = sqrt(max(leaf.area * leaf.area - sine * sine, real(0.0f)));
+    // cosine loses 4e-4 of the area to rounding where b is nearly a right angle
+    real bend = leaf.along + leaf.across * ((cosine + 4e-4f * leaf.area) / max(sine, real(1e-20f)));
+    return min(bend, real(kMostBend));
+}
+
+FN real3 on_plane(LeafPlane leaf, RayPlanes ray, SeenPoint seen, scalar3 y)
+{
+    real y1 = dot(ray.n1, real3(y));
+    real y2 = dot(ray.n2, real3(y));
+    real u = seen.dv.y * y1 - seen.dv.x * y2;
+    real v = seen.du.x * y2 - seen.du.y * y1;
+    return real3(leaf.du) * u + real3(leaf.dv) * v;
+}
+
+// The ray's bend of a rectangle `share` times the leaf's size, around any point of the leaf
+FN real bend_around(LeafPlane leaf, RayPlanes ray, SeenPoint seen, scalar share)
+{
+    // R (P DS_c)^-1 P [Q n]: of two orthogonal axes of the leaf's plane, and of its normal
+    real3 a = on_plane(leaf, ray, seen, leaf.axis);
+    real3 b = on_plane(leaf, ray, seen, cross(leaf.normal, leaf.axis));
+    real3 n = on_plane(leaf, ray, seen, leaf.normal);
+    // the largest singular value of [a b]
+    real aa = dot(a, a);
+    real bb = dot(b, b);
+    real ab = dot(a, b);
+    real spread = sqrt((aa - bb) * (aa - bb) + 4.0f * ab * ab);
+    real along = sqrt(0.5f * (aa + bb + spread));
+    real bend = share * (leaf.along * along + leaf.across * length(n)) / max(abs(seen.det), real(1e-20f));
+    return min(bend, real(kMostBend));
+}
+
+// True where all points of a rectangle `share` times the leaf's size around the point `seen` lie on one side of the ray
+// along the picture's direction (m1, m2), a unit vector
+FN mask lies_aside(LeafPlane leaf, RayPlanes ray, SeenPoint seen, real m1, real m2, scalar share, scalar rounding)
+{
+    real off = abs(m1 * seen.r.x + m2 * seen.r.y);
+    real slope = abs(m1 * seen.du.x + m2 * seen.du.y) * (share * leaf.half_side.x) +
+                 abs(m1 * seen.dv.x + m2 * seen.dv.y) * (share * leaf.half_side.y);
+    real up = abs(dot(ray.n1 * m1 + ray.n2 * m2, real3(leaf.normal)));
+    real level = sqrt(max(1.0f - up * up, real(0.0f)));
+    real bend = (0.5f * share * share * leaf.size) * (leaf.along * level + leaf.across * up);
+    // twice: for the point, and for a root that a patch's overlap lets in
+    return off > slope + bend + 4.0f * rounding;
+}
+
+// True where the ray passes by the rectangle, whatever its slope: along the surface's normal `s.du` x `s.dv` as the ray
+// sees it, where a rectangle that it grazes is thin, or across it
+FN mask passes_by(LeafPlane leaf, RayPlanes ray, SurfacePoint s, SeenPoint seen, scalar share, scalar rounding)
+{
+    real3 n = cross(s.du, s.dv);
+    real n1 = dot(ray.n1, n);
+    real n2 = dot(ray.n2, n);
+    real long_n = sqrt(n1 * n1 + n2 * n2);
+    mask seen_across = long_n > 0.0f;
+    real per_n = 1.0f / max(long_n, real(1e-20f));
+    real m1 = select(seen_across, n1 * per_n, real(1.0f));
+    real m2 = select(seen_across, n2 * per_n, real(0.0f));
+    return lies_aside(leaf, ray, seen, m1, m2, share, rounding) ||
+           lies_aside(leaf, ray, seen, -m2, m1, share, rounding);
+}
+
+// The bend around a point that lies `off` half sides from the middle of the rectangle whose bend it is
+FN real bend_from(real bend, real off)
+{
+    real left = 1.0f - bend * off;
+    return select(left > 0.01f, bend / left, real(kMostBend));
+}
+
+// The normal is that of a last step's beginning: by how much it may be turned, rad (0.006 degrees)
+const scalar kLastTurn = 1e-4f;
+
+// True where a step `moved` is proved to end within rounding of a root; `bend`: that of a rectangle of its size around
+// its beginning, which is no less than what the normal turns on the way
+FN mask newton_exact(SurfacePoint s, NewtonStep next, real2 moved, real bend, scalar rounding, scalar enough)
+{
+    real3 way = s.du * moved.x + s.dv * moved.y;
+    return !next.singular && next.residual <= enough && bend <= kLastTurn && 2.0f * bend * length(way) <= rounding;
+}
+
+// Where a ray's roots in a rectangle may lie, uv_patch; empty where hi < lo
+struct RootBox {
+    real2 lo;
+    real2 hi;
+};
+
+FN mask is_empty(RootBox box)
+{
+    return box.hi.x < box.lo.x || box.hi.y < box.lo.y;
+}
+
+// `box` cut to `reach` (length on the leaf's plane) and `margin` around the end of a Newton step
+FN RootBox narrowed(RootBox box, LeafPlane leaf, real2 to, real reach, real2 margin)
+{
+    real2 half_side = real2(reach * leaf.per_length.x + margin.x, reach * leaf.per_length.y + margin.y);
+    RootBox less;
+    less.lo = real2(max(box.lo.x, to.x - half_side.x), max(box.lo.y, to.y - half_side.y));
+    less.hi = real2(min(box.hi.x, to.x + half_side.x), min(box.hi.y, to.y + half_side.y));
+    return less;
+}
+
+SHARED_CLOSE
+#endif
