@@ -392,7 +392,7 @@ private:
         const scalar2 per_side(1.0f / half_side.x, 1.0f / half_side.y);
         Search search{mask(false), mask(false), mask(false), s, seen, {}, middle};
         RootBox where{middle - real2(half_side), middle + real2(half_side)};
-        mask none(false);
+        mask none(false), near(false);
         // a lane that has settled stays where it is, so that the last round's point is every settled lane's
         for (int step = 0;; ++step) {
             real2& uv = search.uv;
@@ -405,9 +405,10 @@ private:
             const real off = farther(uv - middle, per_side);
             const real bend = bend_from(rectangle.bend, off);
             const real2 moved = next.uv - uv;
-            const mask exact =
-                newton_exact(search.s, next, moved, bend * farther(moved, per_side), newton.rounding, newton.enough);
-            const mask found = moving && (exact || next.residual <= newton.rounding + next.blur);
+            const real turn = bend * farther(moved, per_side);
+            const mask exact = newton_exact(search.s, next, moved, turn, newton.rounding, newton.enough);
+            const mask found = moving && (exact || newton_settled(next, turn, near, newton.rounding));
+            near = next.residual <= newton.rounding + next.blur;
             search.exact = select(found, exact, search.exact);
             search.settled = search.settled || found;
             moving = moving && !found;
@@ -432,9 +433,8 @@ private:
         }
         // one root at most in a rectangle as large as to hold it
         const real off = max(farther(search.uv - middle, per_side), real(1.0f));
-        const real2 blur = root_blur(search.seen, newton.rounding);
-        const mask sharp = max(blur.x, blur.y) <= kNewtonOutside;
-        search.complete = none || (search.settled && sharp && rectangle.bend * off < kOneRoot);
+        const mask blurred = is_blurred(search.uv, root_blur(search.seen, newton.rounding));
+        search.complete = none || (search.settled && !blurred && rectangle.bend * off < kOneRoot);
         return search;
     }
 

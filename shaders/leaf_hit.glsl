@@ -347,6 +347,7 @@ Search find_root(NewtonPatch newton, LeafPlane leaf, Rectangle rectangle, Surfac
     search.uv = rectangle.middle;
     RootBox where = RootBox(rectangle.middle - rectangle.half_side, rectangle.middle + rectangle.half_side);
     bool none = false;
+    bool near = false;
     for (int step = 0;; ++step) {
         vec2 uv = search.uv;
         if (step > 0) {
@@ -357,9 +358,10 @@ Search find_root(NewtonPatch newton, LeafPlane leaf, Rectangle rectangle, Surfac
         search.next = next;
         float bend = bend_from(rectangle.bend, farther(uv - rectangle.middle, rectangle.half_side));
         vec2 moved = next.uv - uv;
-        search.exact = newton_exact(search.s, next, moved, bend * farther(moved, rectangle.half_side), newton.rounding,
-                                    newton.enough);
-        search.settled = search.exact || next.residual <= newton.rounding + next.blur;
+        float turn = bend * farther(moved, rectangle.half_side);
+        search.exact = newton_exact(search.s, next, moved, turn, newton.rounding, newton.enough);
+        search.settled = search.exact || newton_settled(next, turn, near, newton.rounding);
+        near = next.residual <= newton.rounding + next.blur;
         if (search.settled)
             break;
         if (!next.singular) {
@@ -379,9 +381,8 @@ Search find_root(NewtonPatch newton, LeafPlane leaf, Rectangle rectangle, Surfac
     }
     // one root at most in a rectangle as large as to hold it
     float off = max(farther(search.uv - rectangle.middle, rectangle.half_side), 1.0f);
-    vec2 blur = root_blur(search.seen, newton.rounding);
-    bool sharp = max(blur.x, blur.y) <= kNewtonOutside;
-    search.complete = none || (search.settled && sharp && rectangle.bend * off < kOneRoot);
+    bool blurred = is_blurred(search.uv, root_blur(search.seen, newton.rounding));
+    search.complete = none || (search.settled && !blurred && rectangle.bend * off < kOneRoot);
     return search;
 }
 

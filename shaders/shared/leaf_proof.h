@@ -149,8 +149,15 @@ FN real bend_from(real bend, real off)
     return select(left > 0.01f, bend / left, real(kMostBend));
 }
 
-// The normal is that of a last step's beginning: by how much it may be turned, rad (0.006 degrees)
-const scalar kLastTurn = 1e-4f;
+// The normal is that of a last step's beginning: by how much it may be turned, rad (0.0006 degrees)
+const scalar kLastTurn = 1e-5f;
+
+// True where a step begins within rounding of the ray, as `near` says the step before did or where the normal turns no
+// farther: one step more finds the place of the normal, none the root
+FN mask newton_settled(NewtonStep next, real bend, mask near, scalar rounding)
+{
+    return next.residual <= rounding + next.blur && (near || bend <= kLastTurn || next.singular);
+}
 
 // True where a step `moved` is proved to end within rounding of a root; `bend`: that of a rectangle of its size around
 // its beginning, which is no less than what the normal turns on the way
@@ -158,6 +165,14 @@ FN mask newton_exact(SurfacePoint s, NewtonStep next, real2 moved, real bend, sc
 {
     real3 way = s.du * moved.x + s.dv * moved.y;
     return !next.singular && next.residual <= enough && bend <= kLastTurn && 2.0f * bend * length(way) <= rounding;
+}
+
+// True where rounding moves a root `uv` across a side of the patch by more than the patch's overlap lets in
+FN mask is_blurred(real2 uv, real2 blur)
+{
+    real beside_u = abs(abs(uv.x - 0.5f) - 0.5f);
+    real beside_v = abs(abs(uv.y - 0.5f) - 0.5f);
+    return (blur.x > kNewtonOutside && beside_u <= blur.x) || (blur.y > kNewtonOutside && beside_v <= blur.y);
 }
 
 // Where a ray's roots in a rectangle may lie, uv_patch; empty where hi < lo
