@@ -47,7 +47,7 @@ public:
     /// Of the control points, patch units.
     Bounds bounds() const;
 
-    static constexpr double kMostOverlap = 0.03125; // farther out a root is no tracer's (newton_reach.h)
+    static constexpr double kMostOverlap = 1e-3;
 
 private:
     // w x, w y, w z, w

@@ -8,8 +8,9 @@
 
 namespace trimray {
 
-/// Fills image.leaves and the parts' leaf ranges from patches and control points. A leaf's box holds the surface over
-/// its rectangle (convex hull of its control points, rounded outwards). Source: paper eq. 1-2; Piegl & Tiller 5.3.
+/// Fills image.leaves, the parts' leaf ranges and the Bezier patches' param from patches and control points. A leaf's
+/// box holds the surface over its rectangle (convex hull of its control points, rounded outwards). Source: paper eq.
+/// 1-2; Piegl & Tiller 5.3.
 void derive_leaves(PackImage& image, const LeafOptions& options);
 
 /// Fills image.part_nodes, image.top_nodes and the parts' node ranges. Reorders each part's leaves into tree order.

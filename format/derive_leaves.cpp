@@ -273,6 +273,8 @@ void box_net(const Net& net, const std::vector<Point3>& p, LeafRecord& leaf)
     encode_leaf_extent(axes, lo, hi, (nu + nv + 14) * kRounding, leaf);
 }
 
+constexpr double kMostRounding = 1e6; // of a derivative: nothing is proved with that
+
 /// A piece of a patch waiting to be split or kept.
 struct Piece {
     double excess = 0; // worst of its measures over their limits; kept when <= 1
@@ -340,13 +342,15 @@ void judge(Piece& piece, const Net& patch, double scale, const LeafOptions& opti
         judge_bend(piece, patch, length, options);
 }
 
-void add_bezier_leaves(const PackImage& image, uint patch_id, const LeafOptions& options,
-                       std::vector<LeafRecord>& leaves)
+void add_bezier_leaves(PackImage& image, uint patch_id, const LeafOptions& options, std::vector<LeafRecord>& leaves)
 {
-    const PatchRecord& patch = image.patches[patch_id];
+    PatchRecord& patch = image.patches[patch_id];
     std::vector<Point3> scratch;
     std::vector<Piece> heap(1);
     const Net patch_net = load_net(image, patch);
+    const std::array<double, 2> rounding = derivative_rounding(patch_net);
+    for (int i = 0; i < 2; ++i)
+        patch.param[i] = std::nextafter(static_cast<float>(std::min(rounding[i], kMostRounding)), HUGE_VALF);
     heap[0].net = patch_net;
     judge(heap[0], patch_net, patch.scale, options, scratch);
     const auto keep = [&](const Piece& piece) {

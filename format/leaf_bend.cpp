@@ -106,12 +106,17 @@ void raise_with_plane(Scaled& net, const Frame& f)
     ++net.count_v;
 }
 
-/// Largest singular value.
-double spectral_norm(const double (&m)[2][2])
+double square(double x, double y)
 {
-    const double sum = m[0][0] * m[0][0] + m[0][1] * m[0][1] + m[1][0] * m[1][0] + m[1][1] * m[1][1];
+    return x * x + y * y;
+}
+
+/// Square of the largest singular value.
+double squared_norm(const double (&m)[2][2])
+{
+    const double sum = square(m[0][0], m[0][1]) + square(m[1][0], m[1][1]);
     const double det = m[0][0] * m[1][1] - m[0][1] * m[1][0];
-    return std::sqrt(0.5 * (sum + std::sqrt(std::max(0.0, sum * sum - 4 * det * det))));
+    return 0.5 * (sum + std::sqrt(std::max(0.0, sum * sum - 4 * det * det)));
 }
 
 void keep_largest(double& largest, double value)
@@ -132,6 +137,7 @@ struct SecondOrder {
 /// polynomial, bounded by its hull, what comes from the rest is of third order. The same for z with 0 in their place.
 std::array<LeafBend, 2> bend_of(const SecondOrder& s, const Frame& f, bool rational)
 {
+    // squares, but for off_across and grows_by
     double off = 0, slope = 0, off_across = 0, slope_across = 0; // |y - R (u - c)|, |D y - 1|, |z|, |D z|
     double grows = 0, grows_by[2] = {}, turns[2] = {};           // |D w| / w, |w_d| / w, |D^2 w[d, .]| / w
     double along[2] = {}, across[2] = {};
@@ -155,13 +161,13 @@ std::array<LeafBend, 2> bend_of(const SecondOrder& s, const Frame& f, bool ratio
             if (rational) {
                 dw[0] = d1(u, 3);
                 dw[1] = d2(u, v, 3);
-                keep_largest(grows, std::hypot(dw[0], dw[1]));
-                keep_largest(off, per_w * std::hypot(p[0] - p[4], p[1] - p[5]));
+                keep_largest(grows, square(dw[0], dw[1]));
+                keep_largest(off, per_w * per_w * square(p[0] - p[4], p[1] - p[5]));
                 keep_largest(off_across, per_w * std::abs(p[2]));
-                keep_largest(slope_across, std::hypot(d1(u, 2), d2(u, v, 2)));
+                keep_largest(slope_across, square(d1(u, 2), d2(u, v, 2)));
                 const double m[2][2] = {{d1(u, 0) - 1 - d1(u, 4), d2(u, v, 0) - d2(u, v, 4)},
                                         {d1(u, 1) - d1(u, 5), d2(u, v, 1) - 1 - d2(u, v, 5)}};
-                keep_largest(slope, spectral_norm(m));
+                keep_largest(slope, squared_norm(m));
             }
             for (int d = 0; d < 2; ++d) {
                 const Point6 &of_u = *second[d][0], &of_v = *second[d][1];
@@ -179,13 +185,16 @@ std::array<LeafBend, 2> bend_of(const SecondOrder& s, const Frame& f, bool ratio
                         m[c][c] -= w_d;
                     }
                     keep_largest(grows_by[d], std::abs(w_d));
-                    keep_largest(turns[d], h * std::hypot(d1(of_u, 3), d2(of_u, of_v, 3)));
+                    keep_largest(turns[d], h * h * square(d1(of_u, 3), d2(of_u, of_v, 3)));
                 }
-                keep_largest(along[d], spectral_norm(m));
-                keep_largest(across[d], h * std::hypot(d1(of_u, 2), d2(of_u, of_v, 2)));
+                keep_largest(along[d], squared_norm(m));
+                keep_largest(across[d], h * h * square(d1(of_u, 2), d2(of_u, of_v, 2)));
             }
         }
     }
+    for (double* squared :
+         {&off, &slope, &slope_across, &grows, &turns[0], &turns[1], &along[0], &along[1], &across[0], &across[1]})
+        *squared = std::sqrt(*squared);
     slope += off * grows; // D y = (D p - y D w) / w
     slope_across += off_across * grows;
     std::array<LeafBend, 2> bend;
@@ -312,25 +321,25 @@ std::array<LeafBend, 2> leaf_bend_by_side(const Net& patch, const std::array<dou
     if (rational)
         for (Scaled* net_of : {&nets.value, &nets.u, &nets.v, &nets.uu, &nets.uv, &nets.vv})
             raise_with_plane(*net_of, f);
-    std::array<LeafBend, 2> by_side = bend_of(nets, f, rational);
+    return bend_of(nets, f, rational);
+}
 
-    // What single precision makes of DS: a column is degree times the difference of two points of the net of one degree
-    // less, each off by at most patch_rounding / sqrt 2 in one direction (that is for two), so twice patch_rounding in
-    // the plane. Divided by the weight there: w_i / w times as much where the points are heavier than the surface, and
-    // again for w_u S, |S| <= 1. Through R^-1 as any column. The roundings of the doubles here are far below.
-    const auto error = [&](int degree, double t, double w_t) {
-        // w = (1 - t) w_0 + t w_1, w_t = degree (w_1 - w_0), w_0 and w_1 the weights of the two points
-        const double of_end = degree > 0 ? std::max(-t * w_t, (1 - t) * w_t) / (degree * w) : 0;
-        return 2.0 * degree * patch_rounding(degree_u, degree_v) * (rational ? 2 * (1 + of_end) : 1);
-    };
-    const double error_u = error(degree_u, lo[0] + f.half[0], p_u[3]);
-    const double error_v = error(degree_v, lo[1] + f.half[1], p_v[3]);
-    const double rounding = std::hypot(error_u / f.r11, (error_v + std::abs(f.r12) / f.r11 * error_u) / f.r22);
-    for (LeafBend& side : by_side) {
-        side.along += 0.5 * rounding;
-        side.across += 0.5 * rounding;
+std::array<double, 2> derivative_rounding(const Net& patch)
+{
+    double ratio[2] = {1, 1}; // of the weights of two neighbours along u, v
+    const auto weight = [&](int i, int j) { return patch.points[size_t(i) * patch.count_v + j][3]; };
+    const auto compare = [](double& most, double a, double b) { most = std::max({most, a / b, b / a}); };
+    for (int i = 0; i < patch.count_u; ++i) {
+        for (int j = 0; j < patch.count_v; ++j) {
+            if (i > 0)
+                compare(ratio[0], weight(i, j), weight(i - 1, j));
+            if (j > 0)
+                compare(ratio[1], weight(i, j), weight(i, j - 1));
+        }
     }
-    return by_side;
+    const int degree[2] = {patch.count_u - 1, patch.count_v - 1};
+    const double of_point = 2 * patch_rounding(degree[0], degree[1]), of_weight = patch.rational() ? 2 : 1;
+    return {of_point * degree[0] * of_weight * ratio[0], of_point * degree[1] * of_weight * ratio[1]};
 }
 
 } // namespace trimray

@@ -78,7 +78,8 @@ struct PatchRecord {
     float axis_x[3]; // unit, orthogonal; Bezier: the identity
     float axis_y[3];
     float axis_z[3];
-    float param[2];
+    float param[2]; // Bezier: bounds of what single precision loses of S_u and S_v (derivative_rounding,
+                    // format/leaf_bend.h), patch units; what a certificate counts on
 };
 
 // A leaf: a rectangle of a patch and the oriented box around it. Native faces have one leaf or a few, with uv = [0,1]^2

@@ -335,6 +335,8 @@ private:
                 report_.add(3216, "PTCH", fmt::format("patch {}: radii {} {}", i, p.param[0], p.param[1]));
             return;
         }
+        if (!(p.param[0] >= 0 && p.param[1] >= 0))
+            report_.add(3216, "PTCH", fmt::format("patch {}: roundings {} {}", i, p.param[0], p.param[1]));
         if (degree_u == 0 || degree_u > kMaxDegree || degree_v == 0 || degree_v > kMaxDegree) {
             report_.add(3217, "PTCH", fmt::format("patch {}: degrees {} {}", i, degree_u, degree_v));
             return;

@@ -44,7 +44,7 @@ struct EdgeView {
 
 /// A LeafPlane (shaders/shared/leaf_proof.h), whose type is each instruction set's own.
 struct LeafMiddle {
-    float values[28];
+    float values[32];
 };
 
 /// What a block's tracing reads and writes; one a thread, reused.

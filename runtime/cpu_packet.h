@@ -300,29 +300,31 @@ private:
         const NewtonPatch newton = newton_patch(target);
         if (job_.stochastic)
             return intersect_once(target, newton, box, moving, origin, direction, hit);
-        const LeafPlane leaf = middle_of(newton, box, candidate_index);
+        const LeafPlane leaf = middle_of(newton, box, target.patch.param, candidate_index);
         const RayPlanes planes = ray_planes(origin, direction);
         const SurfacePoint middle{real3(leaf.p), real3(leaf.du), real3(leaf.dv)};
         const SeenPoint seen = seen_point(middle, planes);
-        const real bend = middle_bend(leaf, seen);
-        const mask grazing = bend >= kOneRoot;
+        const RayBend bend = middle_bend(leaf, seen);
+        const mask grazing = !holds_one(bend, real(1.0f));
         if (any_lane(moving && grazing))
             moving = moving && !(grazing && passes_by(leaf, planes, middle, seen, 1.0f, newton.rounding));
         const mask straight = moving && !grazing;
-        mask open = moving && grazing;
+        mask open = moving && grazing, doubtful(false);
         if (any_lane(straight)) {
-            const Rectangle whole{real2(leaf.middle), leaf.half_side, leaf.size, bend};
+            const Rectangle whole{real2(leaf.middle), leaf.half_side, bend};
             const Search search = find_root(newton, leaf, whole, planes, middle, seen, straight);
             open = open || (straight && !search.complete);
+            doubtful = straight && search.blurred;
             const Root root = end_of(newton, search, origin, direction);
             const mask near = root.found && in_range(target, root.t, hit);
             if (any_lane(near))
                 offer(target, near, root.t, root.uv, root.normal, hit);
         }
         open = open && base + per_t * in_box.near < hit.best + target.view.slack_mm;
-        if (!any_lane(open))
+        if (any_lane(open))
+            doubtful = doubtful || split(target, newton, leaf, planes, open, origin, direction, hit);
+        if (!any_lane(doubtful))
             return;
-        const mask doubtful = split(target, newton, leaf, planes, open, origin, direction, hit);
         // what it found may lie a little before its box, on the next leaf
         const real from = min(base + per_t * in_box.near, hit.best);
         hit.doubt = select(doubtful, min(from, hit.doubt), hit.doubt);
@@ -349,14 +351,16 @@ private:
     }
 
     /// The leaf's plane, evaluated when the block first asks.
-    HWY_ATTR LeafPlane middle_of(const NewtonPatch& newton, const LeafBox& box, uint32_t candidate_index)
+    HWY_ATTR LeafPlane middle_of(const NewtonPatch& newton, const LeafBox& box, const float (&lost)[2],
+                                 uint32_t candidate_index)
     {
         static_assert(sizeof(LeafPlane) <= sizeof(LeafMiddle));
         LeafMiddle& kept = scratch_.leaf_middles[candidate_index];
         LeafPlane leaf;
         if (!scratch_.has_middle[candidate_index]) {
             const SurfacePoint s = evaluate(newton, real2(leaf_middle(box)));
-            leaf = leaf_plane(box, first_lane(s.p), first_lane(s.du), first_lane(s.dv));
+            leaf = leaf_plane(box, first_lane(s.p), first_lane(s.du), first_lane(s.dv),
+                              derivative_loss(box, scalar2(lost[0], lost[1]), newton.degree_u, newton.degree_v));
             std::memcpy(&kept, &leaf, sizeof leaf);
             scratch_.has_middle[candidate_index] = 1;
         }
@@ -368,8 +372,7 @@ private:
     struct Rectangle {
         real2 middle;
         scalar2 half_side;
-        scalar size; // of LeafPlane
-        real bend;   // around its middle
+        RayBend bend; // around its middle
     };
 
     /// Newton's iteration in a rectangle, by lane
@@ -377,6 +380,7 @@ private:
         mask settled;  // ended at a root
         mask exact;    // its last step is proved to end within rounding
         mask complete; // proved: the rectangle holds no root but this one, and none if it has not settled
+        mask blurred;  // rounding decides whether the root is the patch's
         SurfacePoint s;
         SeenPoint seen;
         NewtonStep next;
@@ -390,7 +394,7 @@ private:
         const real2 middle = rectangle.middle;
         const scalar2 half_side = rectangle.half_side;
         const scalar2 per_side(1.0f / half_side.x, 1.0f / half_side.y);
-        Search search{mask(false), mask(false), mask(false), s, seen, {}, middle};
+        Search search{mask(false), mask(false), mask(false), mask(false), s, seen, {}, middle};
         RootBox where{middle - real2(half_side), middle + real2(half_side)};
         mask none(false), near(false);
         // a lane that has settled stays where it is, so that the last round's point is every settled lane's
@@ -403,19 +407,16 @@ private:
             search.next = newton_step(search.seen, uv);
             const NewtonStep& next = search.next;
             const real off = farther(uv - middle, per_side);
-            const real bend = bend_from(rectangle.bend, off);
+            const RayBend from = bend_from(rectangle.bend, off);
             const real2 moved = next.uv - uv;
-            const real turn = bend * farther(moved, per_side);
-            const mask exact = newton_exact(search.s, next, moved, turn, newton.rounding, newton.enough);
+            const real turn = from.bend * farther(moved, per_side);
+            const mask exact = newton_exact(leaf, search.s, next, moved, turn, newton.rounding, newton.enough);
             const mask found = moving && (exact || newton_settled(next, turn, near, newton.rounding));
             near = next.residual <= newton.rounding + next.blur;
             search.exact = select(found, exact, search.exact);
             search.settled = search.settled || found;
             moving = moving && !found;
-            const real2 below = uv - where.lo, above = where.hi - uv;
-            const real far = farther(real2(max(below.x, above.x), max(below.y, above.y)), per_side);
-            const real2 blur = root_blur(search.seen, 2.0f * newton.rounding);
-            const RootBox less = narrowed(where, leaf, next.uv, (0.5f * rectangle.size) * (bend * far * far), blur);
+            const RootBox less = narrowed(where, leaf, search.seen, uv, next.uv, from.bend, half_side, newton.rounding);
             const mask known = moving && !next.singular;
             where.lo = select(known, less.lo, where.lo);
             where.hi = select(known, less.hi, where.hi);
@@ -433,8 +434,8 @@ private:
         }
         // one root at most in a rectangle as large as to hold it
         const real off = max(farther(search.uv - middle, per_side), real(1.0f));
-        const mask blurred = is_blurred(search.uv, root_blur(search.seen, newton.rounding));
-        search.complete = none || (search.settled && !blurred && rectangle.bend * off < kOneRoot);
+        search.blurred = search.settled && is_blurred(search.uv, root_blur(search.seen, newton.rounding));
+        search.complete = none || (search.settled && holds_one(rectangle.bend, off));
         return search;
     }
 
@@ -573,29 +574,28 @@ private:
             const Part part = stack[--waiting];
             if (split++ == kMostSplits)
                 return false;
-            const bool last = part.depth + 1 == kDeepestSplit || leaf.along >= kHuge; // then nothing is ever proved
+            const bool last = part.depth + 1 == kDeepestSplit;
             const scalar share = split_share(part.depth + 1);
             Rectangle rectangle;
             rectangle.half_side = scalar2(leaf.half_side.x * share, leaf.half_side.y * share);
             rectangle.middle = real2(part.u + column * rectangle.half_side.x, part.v + row * rectangle.half_side.y);
-            rectangle.size = leaf.size * share;
             const SurfacePoint s = evaluate(newton, rectangle.middle);
             const SeenPoint seen = seen_point(s, ray);
             work_.newton_steps += kLanes;
             rectangle.bend = bend_around(leaf, ray, seen, share);
             const mask met = !passes_by(leaf, ray, s, seen, share, newton.rounding);
-            const mask moving = met && (rectangle.bend < kOneRoot || mask(last || part.depth == 0));
+            const mask at_end = mask(last) || bends_for_all(leaf, s, share);
+            const mask moving = met && (holds_one(rectangle.bend, real(1.0f)) || at_end || mask(part.depth == 0));
             mask open = met;
             if (any_lane(moving)) {
                 const Search search = find_root(newton, leaf, rectangle, ray, s, seen, moving);
                 open = met && !search.complete;
+                all = all && !any_lane(moving && search.blurred);
                 const Root root = end_of(newton, search, origin, direction);
-                all = all && list(root, lane, roots);
+                all = list(root, lane, roots) && all;
             }
-            if (last) {
-                all = all && !any_lane(open);
-                continue;
-            }
+            all = all && !any_lane(open && at_end);
+            open = open && !at_end;
             alignas(64) float u[kLanes], v[kLanes];
             store(rectangle.middle.x, u);
             store(rectangle.middle.y, v);

@@ -315,8 +315,7 @@ SurfacePoint evaluate(NewtonPatch newton, vec2 uv)
 struct Rectangle {
     vec2 middle;
     vec2 half_side;
-    float size; // of LeafPlane
-    float bend; // around its middle
+    RayBend bend; // around its middle
 };
 
 // Newton's iteration in a rectangle
@@ -324,6 +323,7 @@ struct Search {
     bool settled;  // ended at a root
     bool exact;    // its last step is proved to end within rounding
     bool complete; // proved: the rectangle holds no root but this one, and none if it has not settled
+    bool blurred;  // rounding decides whether the root is the patch's
     SurfacePoint s;
     SeenPoint seen;
     NewtonStep next;
@@ -356,18 +356,16 @@ Search find_root(NewtonPatch newton, LeafPlane leaf, Rectangle rectangle, Surfac
         }
         NewtonStep next = newton_step(search.seen, uv);
         search.next = next;
-        float bend = bend_from(rectangle.bend, farther(uv - rectangle.middle, rectangle.half_side));
+        RayBend from = bend_from(rectangle.bend, farther(uv - rectangle.middle, rectangle.half_side));
         vec2 moved = next.uv - uv;
-        float turn = bend * farther(moved, rectangle.half_side);
-        search.exact = newton_exact(search.s, next, moved, turn, newton.rounding, newton.enough);
+        float turn = from.bend * farther(moved, rectangle.half_side);
+        search.exact = newton_exact(leaf, search.s, next, moved, turn, newton.rounding, newton.enough);
         search.settled = search.exact || newton_settled(next, turn, near, newton.rounding);
         near = next.residual <= newton.rounding + next.blur;
         if (search.settled)
             break;
         if (!next.singular) {
-            float far = farther(max(uv - where.lo, where.hi - uv), rectangle.half_side);
-            where = narrowed(where, leaf, next.uv, (0.5f * rectangle.size) * (bend * far * far),
-                             root_blur(search.seen, 2.0f * newton.rounding));
+            where = narrowed(where, leaf, search.seen, uv, next.uv, from.bend, rectangle.half_side, newton.rounding);
             none = is_empty(where);
         }
         if (none || step == kNewtonSteps)
@@ -381,8 +379,8 @@ Search find_root(NewtonPatch newton, LeafPlane leaf, Rectangle rectangle, Surfac
     }
     // one root at most in a rectangle as large as to hold it
     float off = max(farther(search.uv - rectangle.middle, rectangle.half_side), 1.0f);
-    bool blurred = is_blurred(search.uv, root_blur(search.seen, newton.rounding));
-    search.complete = none || (search.settled && !blurred && rectangle.bend * off < kOneRoot);
+    search.blurred = search.settled && is_blurred(search.uv, root_blur(search.seen, newton.rounding));
+    search.complete = none || (search.settled && holds_one(rectangle.bend, off));
     return search;
 }
 
@@ -437,10 +435,8 @@ bool split(PatchRay ray, PatchRecord patch, FaceRecord face, NewtonPatch newton,
             return false;
         uint part = stack[--waiting];
         int depth = int(part & 3u) + 1;
-        bool last = depth == kDeepestSplit || plane.along >= kHuge; // then nothing is ever proved
         Rectangle rectangle;
         rectangle.half_side = plane.half_side * split_share(depth);
-        rectangle.size = plane.size * split_share(depth);
         for (uint place = 0u; place < 16u; ++place) {
             if (iteration_limit > 0u && iterations + uint(kNewtonSteps + 2) * newton.work > split_iterations())
                 return false;
@@ -454,12 +450,14 @@ bool split(PatchRay ray, PatchRecord patch, FaceRecord face, NewtonPatch newton,
                 continue;
             rectangle.bend = bend_around(plane, newton.planes, seen, split_share(depth));
             bool complete = false;
-            if (rectangle.bend < kOneRoot || last || depth == 1) {
+            bool at_end = depth == kDeepestSplit || bends_for_all(plane, s, split_share(depth));
+            if (holds_one(rectangle.bend, 1.0f) || at_end || depth == 1) {
                 Search search = find_root(newton, plane, rectangle, s, seen);
                 offer_end(ray, patch, face, newton, search, leaf, instance, rims, hit);
                 complete = search.complete;
+                all = all && !search.blurred;
             }
-            if (!complete && last)
+            if (!complete && at_end)
                 all = false;
             else if (!complete)
                 stack[waiting++] = child;
@@ -490,23 +488,28 @@ void bezier_hit(PatchRay ray, PatchRecord patch, FaceRecord face, LeafBox box, f
         return;
     }
     SurfacePoint s = evaluate(newton, leaf_middle(box));
-    LeafPlane plane = leaf_plane(box, s.p, s.du, s.dv);
+    LeafPlane plane = leaf_plane(
+        box, s.p, s.du, s.dv,
+        derivative_loss(box, vec2(patch.param[0], patch.param[1]), newton.degree_u, newton.degree_v));
     SeenPoint seen = seen_point(s, newton.planes);
-    Rectangle whole = Rectangle(plane.middle, plane.half_side, plane.size, middle_bend(plane, seen));
-    if (whole.bend < kOneRoot) {
+    Rectangle whole = Rectangle(plane.middle, plane.half_side, middle_bend(plane, seen));
+    bool complete = false;
+    bool doubtful = false;
+    if (holds_one(whole.bend, 1.0f)) {
         Search search = find_root(newton, plane, whole, s, seen);
         offer_end(ray, patch, face, newton, search, leaf, instance, rims, hit);
-        if (search.complete)
+        complete = search.complete;
+        doubtful = search.blurred;
+    } else
+        complete = passes_by(plane, newton.planes, s, seen, 1.0f, newton.rounding);
+    if (!complete && box_past < hit.past + ray.slack) {
+        if (iteration_limit > 0u && view.alone == 0u) {
+            overrun = true; // lanes would split at different places, and their loops add up: alone, then
             return;
-    } else if (passes_by(plane, newton.planes, s, seen, 1.0f, newton.rounding))
-        return;
-    if (box_past >= hit.past + ray.slack)
-        return;
-    if (iteration_limit > 0u && view.alone == 0u) {
-        overrun = true; // lanes would split at different places, and their loops add up: alone, then
-        return;
+        }
+        doubtful = !split(ray, patch, face, newton, plane, leaf, instance, rims, hit) || doubtful;
     }
-    if (!split(ray, patch, face, newton, plane, leaf, instance, rims, hit))
+    if (doubtful)
         hit.doubt = min(hit.doubt, min(box_past, hit.past)); // it may lie a little before its box, on the next leaf
 }
 

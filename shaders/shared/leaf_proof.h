@@ -8,6 +8,8 @@
 // - a root x of the rectangle lies within k / 2 |R (x - c)| of c + d;
 // - if k < 1 there is one root at most;
 // - if k |d| <= 1/2, |d| in half sides, there is a root within k |d| |R d| of c + d.
+// What single precision loses of DS_c, E, adds its noise to that, a bound e of |(P DS_c)^-1 P E| whatever the
+// rectangle's size: to k for the one root; and the length of E (x - c) to what rounding may have moved c + d.
 // Source: Krawczyk 1969; Kantorovich's theorem (Ortega & Rheinboldt 12.6); the contraction mapping theorem (5.1).
 #if defined(TRIMRAY_SHARED_LEAF_PROOF_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef TRIMRAY_SHARED_LEAF_PROOF_H
@@ -21,6 +23,11 @@
 
 SHARED_OPEN
 
+// A rectangle's bend and noise below which it holds one root at most, with room for their own rounding
+const scalar kOneRoot = 0.99f;
+// What stands for a bend beyond every proof
+const scalar kMostBend = 1e4f;
+
 // The leaf at its middle, the same for all rays
 struct LeafPlane {
     scalar3 p; // S, S_u, S_v there, patch units
@@ -30,14 +37,37 @@ struct LeafPlane {
     scalar3 axis;   // unit, along S_u
     scalar2 middle; // uv_patch
     scalar2 half_side;
+    scalar uu; // S_u . S_u, |S_u . S_v|, S_v . S_v
+    scalar uv;
+    scalar vv;
     scalar2 per_length; // u and v of a vector are at most these times its length on the plane
     scalar area;        // |S_u x S_v|
     scalar size;        // the longest way on the plane from the middle to a corner
     scalar along;       // LeafBend; kHuge: nothing is known
     scalar across;
+    scalar2 lost; // by single precision, of S_u and S_v, length
+    scalar noise; // what that is to along and across, whatever the rectangle's size
 };
 
-FN LeafPlane leaf_plane(LeafBox box, scalar3 p, scalar3 du, scalar3 dv)
+// Of S_u, or S_v, in the reach of a leaf [lo, hi]: a bound is `most`; and, as where two points of the net meet at the
+// share t neither is heavier than the surface there by more than 1 / t or 1 / (1 - t), what `equal` loses, a derivative
+// between equal weights, times that. The reach of a leaf that begins at lo > 0 begins at lo / 2 at least.
+FN scalar loss_of(scalar most, scalar equal, scalar lo, scalar hi)
+{
+    scalar beside = 0.5f * min(lo, 1.0f - hi);
+    return min(most, 2.0f * equal / max(beside, 1e-6f));
+}
+
+// What single precision loses of a leaf's S_u and S_v, length. most: PatchRecord::param
+FN scalar2 derivative_loss(LeafBox box, scalar2 most, int degree_u, int degree_v)
+{
+    scalar of_point = 2.0f * patch_rounding(degree_u, degree_v);
+    return scalar2(loss_of(most.x, of_point * scalar(degree_u), box.uv_lo.x, box.uv_hi.x),
+                   loss_of(most.y, of_point * scalar(degree_v), box.uv_lo.y, box.uv_hi.y));
+}
+
+// lost: derivative_loss
+FN LeafPlane leaf_plane(LeafBox box, scalar3 p, scalar3 du, scalar3 dv, scalar2 lost)
 {
     LeafPlane leaf;
     leaf.p = p;
@@ -46,8 +76,11 @@ FN LeafPlane leaf_plane(LeafBox box, scalar3 p, scalar3 du, scalar3 dv)
     leaf.middle = leaf_middle(box);
     leaf.half_side = leaf_half_side(box);
     scalar3 n = cross(du, dv);
-    scalar long_u = sqrt(dot(du, du));
-    scalar long_v = sqrt(dot(dv, dv));
+    leaf.uu = dot(du, du);
+    leaf.uv = max(dot(du, dv), -dot(du, dv));
+    leaf.vv = dot(dv, dv);
+    scalar long_u = sqrt(leaf.uu);
+    scalar long_v = sqrt(leaf.vv);
     leaf.area = sqrt(dot(n, n));
     bool no_plane = leaf.area <= 1e-6f * long_u * long_v || leaf.area <= 0.0f;
     scalar per_area = no_plane ? 0.0f : 1.0f / leaf.area;
@@ -57,15 +90,14 @@ FN LeafPlane leaf_plane(LeafBox box, scalar3 p, scalar3 du, scalar3 dv)
     scalar3 to_u = du * leaf.half_side.x;
     scalar3 to_v = dv * leaf.half_side.y;
     leaf.size = max(sqrt(dot(to_u + to_v, to_u + to_v)), sqrt(dot(to_u - to_v, to_u - to_v)));
+    // |E R^-1| of the columns' errors: R^-1's rows are per_length long
+    leaf.lost = lost;
+    leaf.noise = lost.x * leaf.per_length.x + lost.y * leaf.per_length.y;
+    no_plane = no_plane || leaf.noise >= kOneRoot;
     leaf.along = no_plane ? kHuge : box.along;
     leaf.across = no_plane ? kHuge : box.across;
     return leaf;
 }
-
-// A rectangle's bend below which it holds one root at most, with room for the rounding of the bend itself
-const scalar kOneRoot = 0.99f;
-// What stands for a bend beyond every proof
-const scalar kMostBend = 1e4f;
 
 // A leaf that leaves something open is split, 4 x 4 parts at a time, so often, and parts of parts so many times
 const int kDeepestSplit = 3;
@@ -76,14 +108,23 @@ FN scalar split_share(int depth)
     return depth == 1 ? 0.25f : (depth == 2 ? 0.0625f : 0.015625f);
 }
 
+// Of a rectangle as a ray sees it around a point
+struct RayBend {
+    real bend;  // k, of the rectangle's half sides
+    real noise; // e, whatever the rectangle's size
+};
+
 // The ray's bend of the leaf around its middle: along + across / tan b, b the ray's slope against the leaf's plane
-FN real middle_bend(LeafPlane leaf, SeenPoint middle)
+FN RayBend middle_bend(LeafPlane leaf, SeenPoint middle)
 {
     real sine = abs(middle.det);
     real cosine = sqrt(max(leaf.area * leaf.area - sine * sine, real(0.0f)));
     // cosine loses 4e-4 of the area to rounding where b is nearly a right angle
-    real bend = leaf.along + leaf.across * ((cosine + 4e-4f * leaf.area) / max(sine, real(1e-20f)));
-    return min(bend, real(kMostBend));
+    real per_slope = (cosine + 4e-4f * leaf.area) / max(sine, real(1e-20f));
+    RayBend ray;
+    ray.bend = min(leaf.along + leaf.across * per_slope, real(kMostBend));
+    ray.noise = min(leaf.noise + leaf.noise * per_slope, real(kMostBend));
+    return ray;
 }
 
 FN real3 on_plane(LeafPlane leaf, RayPlanes ray, SeenPoint seen, scalar3 y)
@@ -96,7 +137,7 @@ FN real3 on_plane(LeafPlane leaf, RayPlanes ray, SeenPoint seen, scalar3 y)
 }
 
 // The ray's bend of a rectangle `share` times the leaf's size, around any point of the leaf
-FN real bend_around(LeafPlane leaf, RayPlanes ray, SeenPoint seen, scalar share)
+FN RayBend bend_around(LeafPlane leaf, RayPlanes ray, SeenPoint seen, scalar share)
 {
     // R (P DS_c)^-1 P [Q n]: of two orthogonal axes of the leaf's plane, and of its normal
     real3 a = on_plane(leaf, ray, seen, leaf.axis);
@@ -107,9 +148,27 @@ FN real bend_around(LeafPlane leaf, RayPlanes ray, SeenPoint seen, scalar share)
     real bb = dot(b, b);
     real ab = dot(a, b);
     real spread = sqrt((aa - bb) * (aa - bb) + 4.0f * ab * ab);
-    real along = sqrt(0.5f * (aa + bb + spread));
-    real bend = share * (leaf.along * along + leaf.across * length(n)) / max(abs(seen.det), real(1e-20f));
-    return min(bend, real(kMostBend));
+    real per_det = 1.0f / max(abs(seen.det), real(1e-20f));
+    real of_plane = sqrt(0.5f * (aa + bb + spread)) * per_det;
+    real of_normal = length(n) * per_det;
+    RayBend around;
+    around.bend = min(share * (leaf.along * of_plane + leaf.across * of_normal), real(kMostBend));
+    around.noise = min(leaf.noise * (of_plane + of_normal), real(kMostBend));
+    return around;
+}
+
+// True where a rectangle `share` times the leaf's size, whose middle is `s`, bends too much for any ray's proof: beside
+// a pole, where a derivative vanishes, no rectangle is small enough.
+FN mask bends_for_all(LeafPlane leaf, SurfacePoint s, scalar share)
+{
+    scalar bend = share * leaf.along;
+    return dot(s.du, s.du) <= bend * bend * leaf.uu || dot(s.dv, s.dv) <= bend * bend * leaf.vv;
+}
+
+// True where a rectangle `off` times as large holds one root at most
+FN mask holds_one(RayBend ray, real off)
+{
+    return ray.bend * off + ray.noise < kOneRoot;
 }
 
 // True where all points of a rectangle `share` times the leaf's size around the point `seen` lie on one side of the ray
@@ -122,8 +181,9 @@ FN mask lies_aside(LeafPlane leaf, RayPlanes ray, SeenPoint seen, real m1, real 
     real up = abs(dot(ray.n1 * m1 + ray.n2 * m2, real3(leaf.normal)));
     real level = sqrt(max(1.0f - up * up, real(0.0f)));
     real bend = (0.5f * share * share * leaf.size) * (leaf.along * level + leaf.across * up);
+    scalar lost = share * (leaf.lost.x * leaf.half_side.x + leaf.lost.y * leaf.half_side.y);
     // twice: for the point, and for a root that a patch's overlap lets in
-    return off > slope + bend + 4.0f * rounding;
+    return off > slope + bend + lost + 4.0f * rounding;
 }
 
 // True where the ray passes by the rectangle, whatever its slope: along the surface's normal `s.du` x `s.dv` as the ray
@@ -143,10 +203,14 @@ FN mask passes_by(LeafPlane leaf, RayPlanes ray, SurfacePoint s, SeenPoint seen,
 }
 
 // The bend around a point that lies `off` half sides from the middle of the rectangle whose bend it is
-FN real bend_from(real bend, real off)
+FN RayBend bend_from(RayBend ray, real off)
 {
-    real left = 1.0f - bend * off;
-    return select(left > 0.01f, bend / left, real(kMostBend));
+    real left = 1.0f - (ray.bend * off + ray.noise);
+    real per_left = 1.0f / max(left, real(0.01f));
+    RayBend from;
+    from.bend = select(left > 0.01f, ray.bend * per_left, real(kMostBend));
+    from.noise = select(left > 0.01f, ray.noise * per_left, real(kMostBend));
+    return from;
 }
 
 // The normal is that of a last step's beginning: by how much it may be turned, rad (0.0006 degrees)
@@ -161,10 +225,13 @@ FN mask newton_settled(NewtonStep next, real bend, mask near, scalar rounding)
 
 // True where a step `moved` is proved to end within rounding of a root; `bend`: that of a rectangle of its size around
 // its beginning, which is no less than what the normal turns on the way
-FN mask newton_exact(SurfacePoint s, NewtonStep next, real2 moved, real bend, scalar rounding, scalar enough)
+FN mask newton_exact(LeafPlane leaf, SurfacePoint s, NewtonStep next, real2 moved, real bend, scalar rounding,
+                     scalar enough)
 {
     real3 way = s.du * moved.x + s.dv * moved.y;
-    return !next.singular && next.residual <= enough && bend <= kLastTurn && 2.0f * bend * length(way) <= rounding;
+    real lost = leaf.lost.x * abs(moved.x) + leaf.lost.y * abs(moved.y);
+    return !next.singular && next.residual <= enough && bend <= kLastTurn &&
+           2.0f * (bend * length(way) + lost) <= rounding;
 }
 
 // True where rounding moves a root `uv` across a side of the patch by more than the patch's overlap lets in
@@ -186,13 +253,22 @@ FN mask is_empty(RootBox box)
     return box.hi.x < box.lo.x || box.hi.y < box.lo.y;
 }
 
-// `box` cut to `reach` (length on the leaf's plane) and `margin` around the end of a Newton step
-FN RootBox narrowed(RootBox box, LeafPlane leaf, real2 to, real reach, real2 margin)
+// `box` cut to where a root may lie after a step from `uv`, `seen` there, to `to`; `bend` around uv of a rectangle with
+// these half sides; `rounding`: of a point.
+FN RootBox narrowed(RootBox box, LeafPlane leaf, SeenPoint seen, real2 uv, real2 to, real bend, scalar2 half_side,
+                    scalar rounding)
 {
-    real2 half_side = real2(reach * leaf.per_length.x + margin.x, reach * leaf.per_length.y + margin.y);
+    // from uv to the farthest point of the box
+    real off_u = max(uv.x - box.lo.x, box.hi.x - uv.x);
+    real off_v = max(uv.y - box.lo.y, box.hi.y - uv.y);
+    real far = max(off_u * (1.0f / half_side.x), off_v * (1.0f / half_side.y));
+    real way = sqrt(leaf.uu * off_u * off_u + 2.0f * leaf.uv * off_u * off_v + leaf.vv * off_v * off_v);
+    real reach = 0.5f * bend * far * way; // on the leaf's plane
+    real2 blur = root_blur(seen, 2.0f * rounding + leaf.lost.x * off_u + leaf.lost.y * off_v);
+    real2 off = real2(reach * leaf.per_length.x + blur.x, reach * leaf.per_length.y + blur.y);
     RootBox less;
-    less.lo = real2(max(box.lo.x, to.x - half_side.x), max(box.lo.y, to.y - half_side.y));
-    less.hi = real2(min(box.hi.x, to.x + half_side.x), min(box.hi.y, to.y + half_side.y));
+    less.lo = real2(max(box.lo.x, to.x - off.x), max(box.lo.y, to.y - off.y));
+    less.hi = real2(min(box.hi.x, to.x + off.x), min(box.hi.y, to.y + off.y));
     return less;
 }
 

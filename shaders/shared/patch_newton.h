@@ -112,7 +112,7 @@ FN real kept_near(real u, real middle, scalar half_side)
 // that both neighbours reach their common side whatever the patch's shape and the ray's slant. With R_u, R_v the
 // Jacobian's columns, an error of length e moves the root by at most (e |R_v|, e |R_u|) / |det|. Not cut at
 // kNewtonOutside.
-FN real2 root_blur(SeenPoint s, scalar rounding)
+FN real2 root_blur(SeenPoint s, real rounding)
 {
     real per_det = rounding / max(abs(s.det), real(1e-20f));
     return real2(per_det * length(s.dv), per_det * length(s.du));
