@@ -36,7 +36,7 @@ struct Provenance {
 struct LeafOptions {
     float max_turning_rad = 0.4f; // of a leaf's control polygon, each direction; small leaves may turn more
     float max_aspect = 4.0f;      // longer side over shorter, on the surface
-    uint max_leaves_per_patch = 1024;
+    uint max_leaves_per_patch = 4096;
     // rays steeper than this against a leaf's plane are to meet it once by proof (LeafBend::least_slope); small leaves,
     // and those that no split helps, are left as they are. (0, 90]
     float leaf_slope_deg = 30.0f;

@@ -584,7 +584,7 @@ private:
             work_.newton_steps += kLanes;
             rectangle.bend = bend_around(leaf, ray, seen, share);
             const mask met = !passes_by(leaf, ray, s, seen, share, newton.rounding);
-            const mask at_end = mask(last) || bends_for_all(leaf, s, share);
+            const mask at_end = mask(last) || bends_as_ever(leaf, s, share);
             const mask moving = met && (holds_one(rectangle.bend, real(1.0f)) || at_end || mask(part.depth == 0));
             mask open = met;
             if (any_lane(moving)) {

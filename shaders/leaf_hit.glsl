@@ -450,7 +450,7 @@ bool split(PatchRay ray, PatchRecord patch, FaceRecord face, NewtonPatch newton,
                 continue;
             rectangle.bend = bend_around(plane, newton.planes, seen, split_share(depth));
             bool complete = false;
-            bool at_end = depth == kDeepestSplit || bends_for_all(plane, s, split_share(depth));
+            bool at_end = depth == kDeepestSplit || bends_as_ever(plane, s, split_share(depth));
             if (holds_one(rectangle.bend, 1.0f) || at_end || depth == 1) {
                 Search search = find_root(newton, plane, rectangle, s, seen);
                 offer_end(ray, patch, face, newton, search, leaf, instance, rims, hit);

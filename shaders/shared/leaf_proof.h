@@ -157,12 +157,12 @@ FN RayBend bend_around(LeafPlane leaf, RayPlanes ray, SeenPoint seen, scalar sha
     return around;
 }
 
-// True where a rectangle `share` times the leaf's size, whose middle is `s`, bends too much for any ray's proof: beside
-// a pole, where a derivative vanishes, no rectangle is small enough.
-FN mask bends_for_all(LeafPlane leaf, SurfacePoint s, scalar share)
+// True where a rectangle `share` times the leaf's size, whose middle is `s`, bends too much for any ray's proof, and for
+// its size no less than half as much as the leaf: beside a pole, where a derivative vanishes, none is small enough.
+FN mask bends_as_ever(LeafPlane leaf, SurfacePoint s, scalar share)
 {
-    scalar bend = share * leaf.along;
-    return dot(s.du, s.du) <= bend * bend * leaf.uu || dot(s.dv, s.dv) <= bend * bend * leaf.vv;
+    scalar less = share * min(leaf.along, 2.0f);
+    return dot(s.du, s.du) <= less * less * leaf.uu || dot(s.dv, s.dv) <= less * less * leaf.vv;
 }
 
 // True where a rectangle `off` times as large holds one root at most
