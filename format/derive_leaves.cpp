@@ -273,8 +273,6 @@ void box_net(const Net& net, const std::vector<Point3>& p, LeafRecord& leaf)
     encode_leaf_extent(axes, lo, hi, (nu + nv + 14) * kRounding, leaf);
 }
 
-constexpr double kMostRounding = 1e6; // of a derivative: nothing is proved with that
-
 /// A piece of a patch waiting to be split or kept.
 struct Piece {
     double excess = 0; // worst of its measures over their limits; kept when <= 1
@@ -350,7 +348,7 @@ void add_bezier_leaves(PackImage& image, uint patch_id, const LeafOptions& optio
     const Net patch_net = load_net(image, patch);
     const std::array<double, 2> rounding = derivative_rounding(patch_net);
     for (int i = 0; i < 2; ++i)
-        patch.param[i] = std::nextafter(static_cast<float>(std::min(rounding[i], kMostRounding)), HUGE_VALF);
+        patch.param[i] = std::nextafter(static_cast<float>(rounding[i]), HUGE_VALF);
     heap[0].net = patch_net;
     judge(heap[0], patch_net, patch.scale, options, scratch);
     const auto keep = [&](const Piece& piece) {

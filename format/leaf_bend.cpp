@@ -11,6 +11,7 @@ namespace {
 
 using HWY_NAMESPACE::kNewtonOutside;
 using HWY_NAMESPACE::kNewtonReach;
+using HWY_NAMESPACE::kOneRoot;
 using HWY_NAMESPACE::patch_rounding;
 
 constexpr int kMostPoints = int(kMaxDegree) + 2; // along one direction, degree raised by one
@@ -292,6 +293,14 @@ std::array<LeafBend, 2> leaf_bend_by_side(const Net& patch, const std::array<dou
     f.r22 = std::sqrt(dot3(rest, rest));
     if (!(f.r22 > 0))
         return {};
+    // where rounding turns the plane that much no ray is proved anything
+    const std::array<double, 2> most = derivative_rounding(patch);
+    const auto loss = [&](int i, int degree) {
+        return double(HWY_NAMESPACE::loss_of(float(most[i]), patch_rounding(degree_u, degree_v), degree, float(lo[i]),
+                                             float(hi[i])));
+    };
+    if (!(loss(0, degree_u) * std::sqrt(dot3(v, v)) + loss(1, degree_v) * f.r11 < kOneRoot * f.r11 * f.r22))
+        return {};
     f.axis[1] = {rest[0] / f.r22, rest[1] / f.r22, rest[2] / f.r22};
     f.axis[2] = cross3(f.axis[0], f.axis[1]);
 
@@ -339,7 +348,8 @@ std::array<double, 2> derivative_rounding(const Net& patch)
     }
     const int degree[2] = {patch.count_u - 1, patch.count_v - 1};
     const double of_point = 2 * patch_rounding(degree[0], degree[1]), of_weight = patch.rational() ? 2 : 1;
-    return {of_point * degree[0] * of_weight * ratio[0], of_point * degree[1] * of_weight * ratio[1]};
+    const auto bound = [&](int i) { return std::min(of_point * degree[i] * of_weight * ratio[i], kMostRounding); };
+    return {bound(0), bound(1)};
 }
 
 } // namespace trimray

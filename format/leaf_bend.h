@@ -33,7 +33,8 @@ struct LeafBend {
     }
 };
 
-/// Of the leaf [lo, hi] in uv_patch of a patch with this net, in patch units. Infinite where DS_c has no plane, or
+/// Of the leaf [lo, hi] in uv_patch of a patch with this net, in patch units. Infinite where DS_c has no plane or
+/// single precision loses it, or
 /// where a weight of the reach's net is not positive. By convex hulls of the second derivatives over the reach.
 LeafBend leaf_bend(const Net& patch, const std::array<double, 2>& lo, const std::array<double, 2>& hi);
 
@@ -42,11 +43,13 @@ std::array<LeafBend, 2> leaf_bend_by_side(const Net& patch, const std::array<dou
                                           const std::array<double, 2>& hi);
 LeafBend sum(const std::array<LeafBend, 2>& by_side);
 
+inline constexpr double kMostRounding = 1e6; // stands for all that is more
+
 /// Bounds of what single precision loses of S_u and of S_v anywhere on the patch: length in the plane and across it,
 /// patch units. S_u is the degree times the difference of two points of the net of one degree less, each off by at most
 /// patch_rounding / sqrt 2 in one direction (that is for two). Divided by the weight there: r times as much with r the
 /// largest ratio of two neighbouring weights, for the surface's weight lies between those of the two points; and again
-/// for w_u S, |S| <= 1. Infinite where a weight is not positive.
+/// for w_u S, |S| <= 1. Never more than kMostRounding.
 std::array<double, 2> derivative_rounding(const Net& patch);
 
 } // namespace trimray

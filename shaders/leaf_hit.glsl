@@ -12,10 +12,10 @@ bool overrun = false; // a leaf took more
 
 uint group_iterations = 0u; // of the whole subgroup, whose lanes share the driver's limit
 
-// Where loops are limited, what a leaf's splitting may take: a quarter of what is left
+// Where loops are limited, what a leaf's splitting may take: an eighth of what is left
 uint split_iterations()
 {
-    return min(kRoundIterations / 2u, (iteration_limit - min(group_iterations, iteration_limit)) / 4u);
+    return min(kRoundIterations / 2u, (iteration_limit - min(group_iterations, iteration_limit)) / 8u);
 }
 
 // The nearest hit so far. `past` is tau - view.tau_ref, so that what is far from the eye keeps its digits.
@@ -311,19 +311,10 @@ SurfacePoint evaluate(NewtonPatch newton, vec2 uv)
     return bezier_point(newton.first_control_point, newton.degree_u, newton.degree_v, newton.rational, uv);
 }
 
-// A rectangle of a leaf
-struct Rectangle {
-    vec2 middle;
-    vec2 half_side;
-    RayBend bend; // around its middle
-};
-
-// Newton's iteration in a rectangle
+// Where Newton's iteration ended
 struct Search {
-    bool settled;  // ended at a root
-    bool exact;    // its last step is proved to end within rounding
-    bool complete; // proved: the rectangle holds no root but this one, and none if it has not settled
-    bool blurred;  // rounding decides whether the root is the patch's
+    bool settled; // at a root
+    bool exact;   // its last step is proved to end within rounding
     SurfacePoint s;
     SeenPoint seen;
     NewtonStep next;
@@ -334,54 +325,6 @@ struct Search {
 float farther(vec2 d, vec2 half_side)
 {
     return max(abs(d.x) / half_side.x, abs(d.y) / half_side.y);
-}
-
-// From the rectangle's middle, where the surface is `s`
-Search find_root(NewtonPatch newton, LeafPlane leaf, Rectangle rectangle, SurfacePoint s, SeenPoint seen)
-{
-    Search search;
-    search.settled = false;
-    search.exact = false;
-    search.s = s;
-    search.seen = seen;
-    search.uv = rectangle.middle;
-    RootBox where = RootBox(rectangle.middle - rectangle.half_side, rectangle.middle + rectangle.half_side);
-    bool none = false;
-    bool near = false;
-    for (int step = 0;; ++step) {
-        vec2 uv = search.uv;
-        if (step > 0) {
-            search.s = evaluate(newton, uv);
-            search.seen = seen_point(search.s, newton.planes);
-        }
-        NewtonStep next = newton_step(search.seen, uv);
-        search.next = next;
-        RayBend from = bend_from(rectangle.bend, farther(uv - rectangle.middle, rectangle.half_side));
-        vec2 moved = next.uv - uv;
-        float turn = from.bend * farther(moved, rectangle.half_side);
-        search.exact = newton_exact(leaf, search.s, next, moved, turn, newton.rounding, newton.enough);
-        search.settled = search.exact || newton_settled(next, turn, near, newton.rounding);
-        near = next.residual <= newton.rounding + next.blur;
-        if (search.settled)
-            break;
-        if (!next.singular) {
-            where = narrowed(where, leaf, search.seen, uv, next.uv, from.bend, rectangle.half_side, newton.rounding);
-            none = is_empty(where);
-        }
-        if (none || step == kNewtonSteps)
-            break;
-        ++newton_steps;
-        vec2 to = vec2(kept_near(next.uv.x, rectangle.middle.x, rectangle.half_side.x),
-                       kept_near(next.uv.y, rectangle.middle.y, rectangle.half_side.y));
-        if (newton_stuck(next, uv, to))
-            break;
-        search.uv = to;
-    }
-    // one root at most in a rectangle as large as to hold it
-    float off = max(farther(search.uv - rectangle.middle, rectangle.half_side), 1.0f);
-    search.blurred = search.settled && is_blurred(search.uv, root_blur(search.seen, newton.rounding));
-    search.complete = none || (search.settled && holds_one(rectangle.bend, off));
-    return search;
 }
 
 // What a search ended at; accepted anywhere on the patch, so that leaves leave no gaps
@@ -410,63 +353,20 @@ void offer_end(PatchRay ray, PatchRecord patch, FaceRecord face, NewtonPatch new
 // Parts of a leaf are numbered by their places in the parts before: 4 bits a depth, below them the depth
 const uint kDepthBits = 2u;
 
-vec2 part_middle(LeafPlane leaf, uint part)
+vec2 part_middle(LeafBox box, uint part)
 {
-    vec2 middle = leaf.middle;
+    vec2 middle = leaf_middle(box);
     int depth = int(part & 3u);
     for (int i = 1; i <= depth; ++i) {
         uint place = part >> (kDepthBits + 4u * uint(depth - i));
         vec2 off = 2.0f * vec2(float(place & 3u), float(place >> 2u & 3u)) - 3.0f;
-        middle += split_share(i) * leaf.half_side * off;
+        middle += split_share(i) * leaf_half_side(box) * off;
     }
     return middle;
 }
 
-// Offers all roots in the leaf, found by splitting it. False: there may be more.
-bool split(PatchRay ray, PatchRecord patch, FaceRecord face, NewtonPatch newton, LeafPlane plane, uint leaf,
-           uint instance, bool rims, inout Hit hit)
-{
-    uint stack[16 * kDeepestSplit];
-    int waiting = 1;
-    bool all = true;
-    stack[0] = 0u;
-    for (int count = 0; waiting > 0; ++count) {
-        if (count == kMostSplits)
-            return false;
-        uint part = stack[--waiting];
-        int depth = int(part & 3u) + 1;
-        Rectangle rectangle;
-        rectangle.half_side = plane.half_side * split_share(depth);
-        for (uint place = 0u; place < 16u; ++place) {
-            if (iteration_limit > 0u && iterations + uint(kNewtonSteps + 2) * newton.work > split_iterations())
-                return false;
-            iterations += 1u + uint(depth);
-            uint child = ((part >> kDepthBits << 4u | place) << kDepthBits) | uint(depth);
-            rectangle.middle = part_middle(plane, child);
-            SurfacePoint s = evaluate(newton, rectangle.middle);
-            SeenPoint seen = seen_point(s, newton.planes);
-            ++newton_steps;
-            if (passes_by(plane, newton.planes, s, seen, split_share(depth), newton.rounding))
-                continue;
-            rectangle.bend = bend_around(plane, newton.planes, seen, split_share(depth));
-            bool complete = false;
-            bool at_end = depth == kDeepestSplit || bends_as_ever(plane, s, split_share(depth));
-            if (holds_one(rectangle.bend, 1.0f) || at_end || depth == 1) {
-                Search search = find_root(newton, plane, rectangle, s, seen);
-                offer_end(ray, patch, face, newton, search, leaf, instance, rims, hit);
-                complete = search.complete;
-                all = all && !search.blurred;
-            }
-            if (!complete && at_end)
-                all = false;
-            else if (!complete)
-                stack[waiting++] = child;
-        }
-    }
-    return all;
-}
-
-// All roots in the leaf, where its bend allows a proof that they are all
+// All roots in the leaf: of the whole of it, where its bend allows a proof that they are all, else of its parts. One
+// loop of rectangles around one of steps, for the compiler makes copies of all that is called twice.
 void bezier_hit(PatchRay ray, PatchRecord patch, FaceRecord face, LeafBox box, float box_past, uint leaf, uint instance,
                 bool rims, inout Hit hit)
 {
@@ -487,27 +387,117 @@ void bezier_hit(PatchRay ray, PatchRecord patch, FaceRecord face, LeafBox box, f
         newton_once(ray, patch, face, box, newton, leaf, instance, rims, hit);
         return;
     }
-    SurfacePoint s = evaluate(newton, leaf_middle(box));
-    LeafPlane plane = leaf_plane(
-        box, s.p, s.du, s.dv,
-        derivative_loss(box, vec2(patch.param[0], patch.param[1]), newton.degree_u, newton.degree_v));
-    SeenPoint seen = seen_point(s, newton.planes);
-    Rectangle whole = Rectangle(plane.middle, plane.half_side, middle_bend(plane, seen));
-    bool complete = false;
+    vec2 lost = derivative_loss(box, vec2(patch.param[0], patch.param[1]), newton.degree_u, newton.degree_v);
+    uint search_work = uint(kNewtonSteps + 2) * newton.work;
+    LeafPlane plane;
+    uint stack[16 * kDeepestSplit];
+    int waiting = 0;
+    int split_count = 0;
+    uint part = 0u; // whose children are at hand
+    uint place = 0u;
+    uint places = 1u;
+    int depth = 0; // of the children; 0: the leaf itself
+    float share = 1.0f;
     bool doubtful = false;
-    if (holds_one(whole.bend, 1.0f)) {
-        Search search = find_root(newton, plane, whole, s, seen);
-        offer_end(ray, patch, face, newton, search, leaf, instance, rims, hit);
-        complete = search.complete;
-        doubtful = search.blurred;
-    } else
-        complete = passes_by(plane, newton.planes, s, seen, 1.0f, newton.rounding);
-    if (!complete && box_past < hit.past + ray.slack) {
-        if (iteration_limit > 0u && view.alone == 0u) {
-            overrun = true; // lanes would split at different places, and their loops add up: alone, then
-            return;
+    for (;; ++place) {
+        if (place == places) {
+            if (waiting == 0)
+                break;
+            if (split_count == kMostSplits || (depth == 0 && box_past >= hit.past + ray.slack)) {
+                doubtful = doubtful || split_count == kMostSplits;
+                break;
+            }
+            if (iteration_limit > 0u && view.alone == 0u) {
+                overrun = true; // lanes would split at different places, and their loops add up: alone, then
+                return;
+            }
+            ++split_count;
+            part = stack[--waiting];
+            depth = int(part & 3u) + 1;
+            share = split_share(depth);
+            place = 0u;
+            places = 16u;
         }
-        doubtful = !split(ray, patch, face, newton, plane, leaf, instance, rims, hit) || doubtful;
+        if (iteration_limit > 0u && depth > 0 && iterations + search_work > split_iterations()) {
+            doubtful = true;
+            // parts of a part that was searched may be left out; those of the leaf not before its four quarters were
+            if (depth > 1 || iterations + search_work > 2u * split_iterations())
+                break;
+            if (places == 16u) {
+                share = 0.5f;
+                place = 0u;
+                places = 4u;
+            }
+        }
+        iterations += 1u + uint(depth);
+        uint child = depth == 0 ? 0u : ((part >> kDepthBits << 4u | place) << kDepthBits) | uint(depth);
+        vec2 half_side = share * leaf_half_side(box);
+        vec2 middle = part_middle(box, child);
+        if (places == 4u)
+            middle = leaf_middle(box) + half_side * (2.0f * vec2(float(place & 1u), float(place >> 1u)) - 1.0f);
+        Search search;
+        search.settled = false;
+        search.exact = false;
+        search.uv = middle;
+        RootBox where = RootBox(middle - half_side, middle + half_side);
+        RayBend bend;
+        bool none = false; // proved: there is no root in the rectangle
+        bool near = false;
+        bool at_end = depth == kDeepestSplit || places == 4u;
+        for (int step = 0;; ++step) {
+            vec2 uv = search.uv;
+            search.s = evaluate(newton, uv);
+            if (step == 0 && depth == 0)
+                plane = leaf_plane(box, search.s.p, search.s.du, search.s.dv, lost);
+            search.seen = seen_point(search.s, newton.planes);
+            if (step == 0) {
+                if (depth == 0)
+                    bend = middle_bend(plane, search.seen);
+                else
+                    bend = bend_around(plane, newton.planes, search.seen, share);
+                bool one = holds_one(bend, 1.0f);
+                if (depth > 0)
+                    ++newton_steps;
+                if (depth > 0 || !one)
+                    none = passes_by(plane, newton.planes, search.s, search.seen, share, newton.rounding);
+                at_end = at_end || (depth > 0 && bends_as_ever(plane, search.s, share));
+                if (none || !(one || at_end || depth == 1))
+                    break;
+            }
+            NewtonStep next = newton_step(search.seen, uv);
+            search.next = next;
+            RayBend from = bend_from(bend, farther(uv - middle, half_side));
+            vec2 moved = next.uv - uv;
+            float turn = from.bend * farther(moved, half_side);
+            search.exact = newton_exact(plane, search.s, next, moved, turn, newton.rounding, newton.enough);
+            search.settled = search.exact || newton_settled(next, turn, near, newton.rounding);
+            near = next.residual <= newton.rounding + next.blur;
+            if (search.settled)
+                break;
+            if (!next.singular) {
+                where = narrowed(where, plane, search.seen, uv, next.uv, from.bend, half_side, newton.rounding);
+                none = is_empty(where);
+            }
+            if (none || step == kNewtonSteps)
+                break;
+            ++newton_steps;
+            vec2 to =
+                vec2(kept_near(next.uv.x, middle.x, half_side.x), kept_near(next.uv.y, middle.y, half_side.y));
+            if (newton_stuck(next, uv, to))
+                break;
+            search.uv = to;
+        }
+        // one root at most in a rectangle as large as to hold it
+        float off = max(farther(search.uv - middle, half_side), 1.0f);
+        bool complete = none || (search.settled && holds_one(bend, off));
+        if (search.settled) {
+            offer_end(ray, patch, face, newton, search, leaf, instance, rims, hit);
+            doubtful = doubtful || is_blurred(search.uv, root_blur(search.seen, newton.rounding));
+        }
+        if (!complete && at_end)
+            doubtful = true;
+        else if (!complete)
+            stack[waiting++] = child;
     }
     if (doubtful)
         hit.doubt = min(hit.doubt, min(box_past, hit.past)); // it may lie a little before its box, on the next leaf

@@ -147,6 +147,8 @@ TEST(derive_leaves, the_budget_bounds_the_leaves_of_a_patch_and_what_still_bends
 TEST(derive_leaves, fewer_degrees_prove_more_rays_with_more_leaves)
 {
     PackImage image = random_pack(14, 2, 12);
+    for (PatchRecord& patch : image.patches)
+        patch.scale *= 2; // so that few leaves are too small in their part to be split for their bend
     size_t leaves = 0;
     double unproved = 1;
     for (const float slope : {90.0f, 45.0f, 30.0f, 15.0f}) {
@@ -199,7 +201,7 @@ TEST(derive_leaves, a_side_that_meets_in_one_point_but_for_rounding_is_not_split
     const float eps = 5.9604645e-8f, w = 0.70710678f;
     PatchRecord patch{};
     patch.shape = kKindBezier | 1u << 8 | 2u << 16 | kShapeRational;
-    patch.scale = 1;
+    patch.scale = 1.5f; // leaves beside the apex are large enough in their part to be split for their bend
     PackImage image;
     image.patches.push_back(patch);
     image.control_points = {0.5f,  0.5f + eps, 0.5f - eps, 1,         w * 0.5f, w * 0.5f, w * (0.5f + eps),

@@ -114,9 +114,9 @@ inline Frame right_picture(const std::shared_ptr<const Scene>& scene, const Rend
     uint64_t beside = 0;
     for (const FaultyPixel& p : found.pixels) {
         beside += p.fault == Fault::FalseHit && p.doubt != Doubt::Tangent && p.hair_px <= 0.01;
-        std::cout << fmt::format("  {} at {}, {}: {} mm, face {}, instead of {} mm, face {}; {} px from a rim\n",
-                                 kFaultNames[size_t(p.fault)], p.x, p.y, p.tracer_mm, p.tracer_face, p.reference_mm,
-                                 p.reference_face, p.hair_px);
+        std::cout << fmt::format("  {}{} at {}, {}: {} mm, face {}, instead of {} mm, face {}; {} px from a rim\n",
+                                 p.certified ? "certified " : "", kFaultNames[size_t(p.fault)], p.x, p.y, p.tracer_mm,
+                                 p.tracer_face, p.reference_mm, p.reference_face, p.hair_px);
     }
     EXPECT_EQ(sum(found.faults) - beside, 0u) << name;
     EXPECT_LE(beside, most_beside) << name;

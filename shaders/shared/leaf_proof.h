@@ -23,8 +23,6 @@
 
 SHARED_OPEN
 
-// A rectangle's bend and noise below which it holds one root at most, with room for their own rounding
-const scalar kOneRoot = 0.99f;
 // What stands for a bend beyond every proof
 const scalar kMostBend = 1e4f;
 
@@ -49,21 +47,12 @@ struct LeafPlane {
     scalar noise; // what that is to along and across, whatever the rectangle's size
 };
 
-// Of S_u, or S_v, in the reach of a leaf [lo, hi]: a bound is `most`; and, as where two points of the net meet at the
-// share t neither is heavier than the surface there by more than 1 / t or 1 / (1 - t), what `equal` loses, a derivative
-// between equal weights, times that. The reach of a leaf that begins at lo > 0 begins at lo / 2 at least.
-FN scalar loss_of(scalar most, scalar equal, scalar lo, scalar hi)
-{
-    scalar beside = 0.5f * min(lo, 1.0f - hi);
-    return min(most, 2.0f * equal / max(beside, 1e-6f));
-}
-
 // What single precision loses of a leaf's S_u and S_v, length. most: PatchRecord::param
 FN scalar2 derivative_loss(LeafBox box, scalar2 most, int degree_u, int degree_v)
 {
-    scalar of_point = 2.0f * patch_rounding(degree_u, degree_v);
-    return scalar2(loss_of(most.x, of_point * scalar(degree_u), box.uv_lo.x, box.uv_hi.x),
-                   loss_of(most.y, of_point * scalar(degree_v), box.uv_lo.y, box.uv_hi.y));
+    scalar of_point = patch_rounding(degree_u, degree_v);
+    return scalar2(loss_of(most.x, of_point, degree_u, box.uv_lo.x, box.uv_hi.x),
+                   loss_of(most.y, of_point, degree_v, box.uv_lo.y, box.uv_hi.y));
 }
 
 // lost: derivative_loss
@@ -157,8 +146,8 @@ FN RayBend bend_around(LeafPlane leaf, RayPlanes ray, SeenPoint seen, scalar sha
     return around;
 }
 
-// True where a rectangle `share` times the leaf's size, whose middle is `s`, bends too much for any ray's proof, and for
-// its size no less than half as much as the leaf: beside a pole, where a derivative vanishes, none is small enough.
+// True where a rectangle `share` times the leaf's size, whose middle is `s`, bends too much for any ray's proof, and
+// for its size no less than half as much as the leaf: beside a pole, where a derivative vanishes, none is small enough.
 FN mask bends_as_ever(LeafPlane leaf, SurfacePoint s, scalar share)
 {
     scalar less = share * min(leaf.along, 2.0f);

@@ -24,5 +24,17 @@ FN scalar patch_rounding(int degree_u, int degree_v)
     return 1.4142136f * (2.0f + 2.0f * scalar(degree_u + degree_v) + 4.0f) * kRounding;
 }
 
+// A rectangle's bend and noise below which it holds one root at most, with room for their own rounding
+const scalar kOneRoot = 0.99f;
+// What single precision loses of S_u, or S_v, of that degree in the reach of a leaf [lo, hi], length in the plane or
+// across it. A bound is `most`, the whole patch's (PatchRecord::param). Where two points of the net meet at the share
+// t, neither is heavier than the surface there by more than 1 / t or 1 / (1 - t): another is as much of what is lost
+// between equal weights. The reach of a leaf that begins at lo > 0 begins at lo / 2 at least. of_point: patch_rounding.
+FN scalar loss_of(scalar most, scalar of_point, int degree, scalar lo, scalar hi)
+{
+    scalar beside = max(0.5f * min(lo, 1.0f - hi), 1e-6f);
+    return min(most, 4.0f * of_point * scalar(degree) / beside);
+}
+
 SHARED_CLOSE
 #endif
