@@ -322,7 +322,9 @@ ReferenceHit ClosestReference::closest(const Ray& ray) const
 Vec3 ClosestReference::outward_in_part(uint patch_id, const std::array<double, 2>& uv_patch) const
 {
     const PatchRecord& patch = image_.patches[patch_id];
-    const Vec3 own = kind_of(patch) == kKindBezier ? beziers_[patch_id]->normal(uv_patch[0], uv_patch[1])
+    // beyond a pole's side a patch is turned inside out
+    const Vec3 own = kind_of(patch) == kKindBezier ? beziers_[patch_id]->normal(std::clamp(uv_patch[0], 0.0, 1.0),
+                                                                                std::clamp(uv_patch[1], 0.0, 1.0))
                                                    : reference::native_normal(patch, uv_patch[0], uv_patch[1]);
     const Matrix a = axes_of(patch);
     const Real handed =

@@ -55,9 +55,9 @@ std::vector<Model> models()
              revolved({{0, 0.5}, {0.4, 0.5}, {0.8, 0.3}, {0.9, -0.2}}),
              0.5,
              {0.1, 0.2, 0.1},
-             {false, true, true}},
+             {false, false, false}},
             {"native cone", native(kKindCone), -0.5, {0.1, 0.3, 90}, {false, false, true}},
-            {"Bezier cone", revolved({{0, 0.5}, {0.8, -0.3}}), 0.5, {0.3, 90, 90}, {false, true, true}}};
+            {"Bezier cone", revolved({{0, 0.5}, {0.8, -0.3}}), 0.5, {0.3, 90, 90}, {false, false, true}}};
 }
 
 struct Found {
