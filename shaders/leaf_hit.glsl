@@ -10,12 +10,15 @@ const uint kTorusIterations = 3u * 24u + 4u * 32u; // bound of torus_roots
 const uint kRoundIterations = 20000u;
 bool overrun = false; // a leaf took more
 
-uint group_iterations = 0u; // of the whole subgroup, whose lanes share the driver's limit
+const uint kPartsWork = 64u; // evaluations that the 16 parts of a leaf take, about
+uint group_iterations = 0u;  // of the whole subgroup, whose lanes share the driver's limit
 
-// Where loops are limited, what a leaf's splitting may take: an eighth of what is left
+// Where loops are limited, what a leaf's splitting may take: a sixth of what is left of three quarters of the limit, for
+// leaves behind must be searched too
 uint split_iterations()
 {
-    return min(kRoundIterations / 2u, (iteration_limit - min(group_iterations, iteration_limit)) / 8u);
+    uint most = iteration_limit / 4u * 3u;
+    return min(kRoundIterations / 2u, (most - min(group_iterations, most)) / 6u);
 }
 
 // The nearest hit so far. `past` is tau - view.tau_ref, so that what is far from the eye keeps its digits.
@@ -417,17 +420,16 @@ void bezier_hit(PatchRay ray, PatchRecord patch, FaceRecord face, LeafBox box, f
             share = split_share(depth);
             place = 0u;
             places = 16u;
-        }
-        if (iteration_limit > 0u && depth > 0 && iterations + search_work > split_iterations()) {
-            doubtful = true;
-            // parts of a part that was searched may be left out; those of the leaf not before its four quarters were
-            if (depth > 1 || iterations + search_work > 2u * split_iterations())
-                break;
-            if (places == 16u) {
+            if (iteration_limit > 0u && depth == 1 && iterations + kPartsWork * newton.work > split_iterations()) {
+                doubtful = true; // not enough for the parts, which its four quarters stand for
                 share = 0.5f;
-                place = 0u;
                 places = 4u;
             }
+        }
+        if (iteration_limit > 0u && depth > 0 &&
+            iterations + search_work > (depth == 1 ? 2u : 1u) * split_iterations()) {
+            doubtful = true;
+            break;
         }
         iterations += 1u + uint(depth);
         uint child = depth == 0 ? 0u : ((part >> kDepthBits << 4u | place) << kDepthBits) | uint(depth);

@@ -65,7 +65,7 @@ TEST(effect_plan, grows_by_what_is_added_and_by_nothing_else)
     image.leaves[1].quat_z_bend = 152u << 16; // along = 1/2
     EXPECT_THAT(names(image),
                 testing::ElementsAre("plane", "bezier-rational", "trim-exact", "instances", "mirrored-instances",
-                                     "face-colors", "instance-colors", "many-starts", "shading"));
+                                     "face-colors", "instance-colors", "leaf-parts", "shading"));
 }
 
 TEST(effect_plan, names_what_is_drawn_and_only_that)

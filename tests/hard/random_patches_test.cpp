@@ -69,15 +69,15 @@ TEST_P(random_patches, are_traced_wrong_as_seldom_as_stated)
     }
 }
 
-// as measured, and two rays more but for false misses and what is certified where there is none
+// as measured, and two rays more where there are some
 INSTANTIATE_TEST_SUITE_P(shapes, random_patches,
-                         testing::Values(Share{Shape::Hills, {0, 200, 150, 150, 100}, {0, 400, 400, 550, 700}},
-                                         Share{Shape::Folded, {0, 150, 150, 150, 150}, {0, 300, 0, 150, 400}},
-                                         Share{Shape::Cusped, {0, 150, 0, 100, 100}, {0, 250, 0, 150, 400}},
-                                         Share{Shape::Needle, {0, 250, 0, 150, 400}, {0, 250, 250, 250, 550}},
-                                         Share{Shape::Flat, {0, 100, 0, 100, 100}, {0, 150, 0, 150, 150}},
-                                         Share{Shape::Degenerate, {0, 150, 0, 100, 300}, {0, 450, 0, 150, 400}},
-                                         Share{Shape::Coincident, {950, 250, 950, 250, 100}, {0, 150, 0, 150, 250}}));
+                         testing::Values(Share{Shape::Hills, {0, 110, 0, 0, 0}, {0, 0, 0, 0, 580}},
+                                         Share{Shape::Folded, {0, 0, 0, 0, 0}, {0, 220, 0, 0, 0}},
+                                         Share{Shape::Cusped, {0, 0, 0, 0, 0}, {0, 0, 0, 0, 0}},
+                                         Share{Shape::Needle, {0, 110, 0, 0, 110}, {0, 0, 0, 150, 550}},
+                                         Share{Shape::Flat, {0, 0, 0, 0, 0}, {0, 0, 0, 0, 0}},
+                                         Share{Shape::Degenerate, {0, 0, 0, 0, 220}, {0, 0, 0, 0, 0}},
+                                         Share{Shape::Coincident, {0, 0, 0, 0, 0}, {0, 0, 0, 0, 0}}));
 
 TEST(shrink, comes_to_the_simplest_patch_that_is_still_hit)
 {
