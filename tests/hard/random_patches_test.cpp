@@ -69,15 +69,15 @@ TEST_P(random_patches, are_traced_wrong_as_seldom_as_stated)
     }
 }
 
-// as measured, and two rays more where there are some
+// as measured, and two rays more but for false misses and what is certified, of which there is none
 INSTANTIATE_TEST_SUITE_P(shapes, random_patches,
-                         testing::Values(Share{Shape::Hills, {0, 110, 0, 0, 0}, {0, 0, 0, 0, 580}},
-                                         Share{Shape::Folded, {0, 0, 0, 0, 0}, {0, 220, 0, 0, 0}},
-                                         Share{Shape::Cusped, {0, 0, 0, 0, 0}, {0, 0, 0, 0, 0}},
-                                         Share{Shape::Needle, {0, 110, 0, 0, 110}, {0, 0, 0, 150, 550}},
-                                         Share{Shape::Flat, {0, 0, 0, 0, 0}, {0, 0, 0, 0, 0}},
-                                         Share{Shape::Degenerate, {0, 0, 0, 0, 220}, {0, 0, 0, 0, 0}},
-                                         Share{Shape::Coincident, {0, 0, 0, 0, 0}, {0, 0, 0, 0, 0}}));
+                         testing::Values(Share{Shape::Hills, {0, 110, 0, 75, 75}, {0, 150, 0, 150, 580}},
+                                         Share{Shape::Folded, {0, 75, 0, 75, 75}, {0, 220, 0, 150, 150}},
+                                         Share{Shape::Cusped, {0, 75, 0, 75, 75}, {0, 150, 0, 150, 150}},
+                                         Share{Shape::Needle, {0, 110, 0, 75, 110}, {0, 150, 0, 150, 550}},
+                                         Share{Shape::Flat, {0, 75, 0, 75, 75}, {0, 150, 0, 150, 150}},
+                                         Share{Shape::Degenerate, {0, 75, 0, 75, 220}, {0, 150, 0, 150, 150}},
+                                         Share{Shape::Coincident, {0, 75, 0, 75, 75}, {0, 150, 0, 150, 150}}));
 
 TEST(shrink, comes_to_the_simplest_patch_that_is_still_hit)
 {
