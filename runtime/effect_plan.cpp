@@ -162,7 +162,7 @@ std::vector<EffectItem> effect_plan(const PackImage& image, const RenderOptions&
         plan.push_back({"stochastic-starts", "asked for: one start a leaf and frame, the nearest hit of all frames"});
     else if (slopes.flagged > 0)
         plan.push_back({"leaf-parts", fmt::format("{} flagged, of {}: no ray is proved to meet them once",
-                                                   counted(slopes.flagged, "leaf is", "leaves are"), slopes.leaves)});
+                                                  counted(slopes.flagged, "leaf is", "leaves are"), slopes.leaves)});
     if (options.shade) {
         plan.push_back({"shading", "the picture is asked for, not hits alone"});
         add_drawing(image, options, plan);
