@@ -252,7 +252,8 @@ FN RootBox narrowed(RootBox box, LeafPlane leaf, SeenPoint seen, real2 uv, real2
     real off_v = max(uv.y - box.lo.y, box.hi.y - uv.y);
     real far = max(off_u * (1.0f / half_side.x), off_v * (1.0f / half_side.y));
     real way = sqrt(leaf.uu * off_u * off_u + 2.0f * leaf.uv * off_u * off_v + leaf.vv * off_v * off_v);
-    real reach = 0.5f * bend * far * way; // on the leaf's plane
+    // on the leaf's plane; beyond every proof a root may lie anywhere
+    real reach = select(bend < kMostBend, 0.5f * bend * far * way, real(kHuge));
     real2 blur = root_blur(seen, 2.0f * rounding + leaf.lost.x * off_u + leaf.lost.y * off_v);
     real2 off = real2(reach * leaf.per_length.x + blur.x, reach * leaf.per_length.y + blur.y);
     RootBox less;

@@ -26,6 +26,7 @@ FN scalar patch_rounding(int degree_u, int degree_v)
 
 // A rectangle's bend and noise below which it holds one root at most, with room for their own rounding
 const scalar kOneRoot = 0.99f;
+
 // What single precision loses of S_u, or S_v, of that degree in the reach of a leaf [lo, hi], length in the plane or
 // across it. A bound is `most`, the whole patch's (PatchRecord::param). Where two points of the net meet at the share
 // t, neither is heavier than the surface there by more than 1 / t or 1 / (1 - t): another is as much of what is lost
