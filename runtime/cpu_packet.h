@@ -13,11 +13,11 @@
 #include "runtime/cpu_evaluate.h"
 #include "runtime/cpu_fetch.h"
 #include "runtime/cpu_lanes.h"
+#include "runtime/cpu_leaf_roots.h"
 #include "runtime/cpu_stochastic.h"
 #include "runtime/cpu_trim.h"
 #include "runtime/cpu_trim_reference.h"
 #include "runtime/cpu_write.h"
-#include "shaders/shared/leaf_proof.h"
 #include "shaders/shared/leaf_start.h"
 #include "shaders/shared/quadric.h"
 #include "shaders/shared/rim.h"
@@ -164,9 +164,6 @@ private:
         return hit;
     }
 
-    /// Work is counted a ray, not a packet: what Vulkan's invocations count.
-    HWY_ATTR static uint64_t lane_count(mask lanes) { return uint64_t(__builtin_popcount(lane_bits(lanes))); }
-
     /// Tests one candidate; true if a ray's nearest hit changed.
     HWY_ATTR bool intersect(const Packet& packet, uint32_t candidate_index, PacketHit& hit)
     {
@@ -312,7 +309,7 @@ private:
         mask open = moving && grazing, doubtful(false);
         if (any_lane(straight)) {
             const Rectangle whole{real2(leaf.middle), leaf.half_side, bend};
-            const Search search = find_root(newton, leaf, whole, planes, middle, seen, straight);
+            const Search search = find_root(newton, leaf, whole, planes, middle, seen, straight, work_.newton_steps);
             open = open || (straight && !search.complete);
             doubtful = straight && search.blurred;
             const Root root = end_of(newton, search, origin, direction);
@@ -330,19 +327,12 @@ private:
         hit.doubt = select(doubtful, min(from, hit.doubt), hit.doubt);
     }
 
-    struct NewtonPatch {
-        uint first_control_point;
-        int degree_u, degree_v;
-        Evaluate evaluate;
-        scalar enough;   // residual of the last step, patch units
-        scalar rounding; // residual that rounding alone may leave, patch units
-    };
-
     HWY_ATTR NewtonPatch newton_patch(const Target& target) const
     {
         const PatchRecord& patch = target.patch;
         const int degree_u = int(patch.shape >> 8 & 0xffu), degree_v = int(patch.shape >> 16 & 0xffu);
-        return {patch.first_control_point,
+        return {source_,
+                patch.first_control_point,
                 degree_u,
                 degree_v,
                 find_evaluate(patch.shape),
@@ -358,7 +348,7 @@ private:
         LeafMiddle& kept = scratch_.leaf_middles[candidate_index];
         LeafPlane leaf;
         if (!scratch_.has_middle[candidate_index]) {
-            const SurfacePoint s = evaluate(newton, real2(leaf_middle(box)));
+            const SurfacePoint s = newton.at(real2(leaf_middle(box)));
             leaf = leaf_plane(box, first_lane(s.p), first_lane(s.du), first_lane(s.dv),
                               derivative_loss(box, scalar2(lost[0], lost[1]), newton.degree_u, newton.degree_v));
             std::memcpy(&kept, &leaf, sizeof leaf);
@@ -368,126 +358,6 @@ private:
         return leaf;
     }
 
-    /// Rectangles of one leaf, one a lane.
-    struct Rectangle {
-        real2 middle;
-        scalar2 half_side;
-        RayBend bend; // around its middle
-    };
-
-    /// Newton's iteration in a rectangle, by lane
-    struct Search {
-        mask settled;  // ended at a root
-        mask exact;    // its last step is proved to end within rounding
-        mask complete; // proved: the rectangle holds no root but this one, and none if it has not settled
-        mask blurred;  // rounding decides whether the root is the patch's
-        SurfacePoint s;
-        SeenPoint seen;
-        NewtonStep next;
-        real2 uv;
-    };
-
-    /// From the rectangle's middle, where the surface is `s`, in the lanes `moving`.
-    HWY_ATTR HWY_NOINLINE Search find_root(const NewtonPatch& newton, const LeafPlane& leaf, const Rectangle& rectangle,
-                                           const RayPlanes& planes, SurfacePoint s, SeenPoint seen, mask moving)
-    {
-        const real2 middle = rectangle.middle;
-        const scalar2 half_side = rectangle.half_side;
-        const scalar2 per_side(1.0f / half_side.x, 1.0f / half_side.y);
-        Search search{mask(false), mask(false), mask(false), mask(false), s, seen, {}, middle};
-        RootBox where{middle - real2(half_side), middle + real2(half_side)};
-        mask none(false), near(false);
-        // a lane that has settled stays where it is, so that the last round's point is every settled lane's
-        for (int step = 0;; ++step) {
-            real2& uv = search.uv;
-            if (step > 0) {
-                search.s = evaluate(newton, uv);
-                search.seen = seen_point(search.s, planes);
-            }
-            search.next = newton_step(search.seen, uv);
-            const NewtonStep& next = search.next;
-            const real off = farther(uv - middle, per_side);
-            const RayBend from = bend_from(rectangle.bend, off);
-            const real2 moved = next.uv - uv;
-            const real turn = from.bend * farther(moved, per_side);
-            const mask exact = newton_exact(leaf, search.s, next, moved, turn, newton.rounding, newton.enough);
-            const mask found = moving && (exact || newton_settled(next, turn, near, newton.rounding));
-            near = next.residual <= newton.rounding + next.blur;
-            search.exact = select(found, exact, search.exact);
-            search.settled = search.settled || found;
-            moving = moving && !found;
-            const RootBox less = narrowed(where, leaf, search.seen, uv, next.uv, from.bend, half_side, newton.rounding);
-            const mask known = moving && !next.singular;
-            where.lo = select(known, less.lo, where.lo);
-            where.hi = select(known, less.hi, where.hi);
-            const mask empty = moving && is_empty(where);
-            none = none || empty;
-            moving = moving && !empty;
-            if (!any_lane(moving) || step == kNewtonSteps)
-                break;
-            work_.newton_steps += lane_count(moving);
-            const real2 to =
-                real2(kept_near(next.uv.x, middle.x, half_side.x), kept_near(next.uv.y, middle.y, half_side.y));
-            const mask stuck = newton_stuck(next, uv, to);
-            uv = select(moving, to, uv);
-            moving = moving && !stuck;
-        }
-        // one root at most in a rectangle as large as to hold it
-        const real off = max(farther(search.uv - middle, per_side), real(1.0f));
-        search.blurred = search.settled && is_blurred(search.uv, root_blur(search.seen, newton.rounding));
-        search.complete = none || (search.settled && holds_one(rectangle.bend, off));
-        return search;
-    }
-
-    /// The larger of |d| in half sides.
-    HWY_ATTR static real farther(real2 d, scalar2 per_side)
-    {
-        return max(abs(d.x) * per_side.x, abs(d.y) * per_side.y);
-    }
-
-    struct Root {
-        mask found; // it lies on the patch
-        real2 uv;
-        real t;
-        real3 normal;
-    };
-
-    /// What the search ended at; accepted anywhere on the patch, so that leaves leave no gaps.
-    HWY_ATTR HWY_NOINLINE Root end_of(const NewtonPatch& newton, const Search& search, real3 origin, real3 direction)
-    {
-        Root end;
-        const NewtonRoot root = newton_root(search.s, search.next, search.uv, search.exact, origin, direction);
-        const real2 overlap = patch_overlap(root_blur(search.seen, newton.rounding));
-        end.uv = root.uv;
-        end.t = root.t;
-        end.found =
-            search.settled && abs(root.uv.x - 0.5f) <= 0.5f + overlap.x && abs(root.uv.y - 0.5f) <= 0.5f + overlap.y;
-        end.normal = patch_normal(newton, search.s, search.uv, end.found);
-        return end;
-    }
-
-    /// S_u x S_v at uv, where the patch's point is s, for the lanes `asked`; beyond a side the one at the side, and at
-    /// a pole or along a degenerate side the one a little way inside.
-    HWY_ATTR HWY_NOINLINE real3 patch_normal(const NewtonPatch& newton, SurfacePoint s, real2 uv, mask asked)
-    {
-        const real2 within(clamp(uv.x, real(0.0f), real(1.0f)), clamp(uv.y, real(0.0f), real(1.0f)));
-        // beyond a side that is one point the patch is turned inside out
-        const mask beyond = asked && !(within.x == uv.x && within.y == uv.y);
-        if (any_lane(beyond)) {
-            const SurfacePoint side = evaluate(newton, within);
-            s.du = select(beyond, side.du, s.du);
-            s.dv = select(beyond, side.dv, s.dv);
-        }
-        const real3 normal = cross(s.du, s.dv);
-        const mask flat = dot(normal, normal) <= 1e-10f * dot(s.du, s.du) * dot(s.dv, s.dv) ||
-                          dot(s.du, s.du) <= 1e-10f * dot(s.dv, s.dv) || dot(s.dv, s.dv) <= 1e-10f * dot(s.du, s.du);
-        if (!any_lane(asked && flat))
-            return normal;
-        constexpr float kInwards = 1.0f / 2048;
-        const SurfacePoint inside = evaluate(newton, within + real2(0.5f - within.x, 0.5f - within.y) * real(kInwards));
-        return select(flat, cross(inside.du, inside.dv), normal);
-    }
-
     /// Plain Newton from the frame's start in the leaf, in the lanes `moving`.
     HWY_ATTR HWY_NOINLINE void intersect_once(Target& target, const NewtonPatch& newton, const LeafBox& box,
                                               mask moving, real3 origin, real3 direction, PacketHit& hit)
@@ -495,7 +365,7 @@ private:
         const RayPlanes planes = ray_planes(origin, direction);
         const auto [start_u, start_v] = job_.stochastic->start;
         const PlainEnd end =
-            plain_newton([&](real2 uv) HWY_ATTR { return evaluate(newton, uv); },
+            plain_newton([&](real2 uv) HWY_ATTR { return newton.at(uv); },
                          [&](mask lanes) HWY_ATTR { work_.newton_steps += lane_count(lanes); }, planes, box,
                          newton.enough, leaf_start(scalar2(start_u, start_v), box.uv_lo, box.uv_hi), moving);
         if (!any_lane(end.settled))
@@ -508,15 +378,6 @@ private:
         if (any_lane(near))
             offer(target, near, t, end.uv, patch_normal(newton, end.s, end.uv, near), hit);
     }
-
-    static constexpr int kMostRoots = 12; // of a ray in a leaf
-
-    /// The roots of a packet's rays, in arrays by root and lane
-    struct RootLists {
-        alignas(64) float t[kMostRoots][kLanes], u[kMostRoots][kLanes], v[kMostRoots][kLanes];
-        alignas(64) float nx[kMostRoots][kLanes], ny[kMostRoots][kLanes], nz[kMostRoots][kLanes];
-        int count[kLanes] = {};
-    };
 
     /// Offers all roots of the rays `open`, found by splitting the leaf. Returns the rays that may have more.
     HWY_ATTR HWY_NOINLINE mask split(Target& target, const NewtonPatch& newton, const LeafPlane& leaf,
@@ -536,7 +397,7 @@ private:
             const auto all = [&](int i) HWY_ATTR { return real(rays[i][lane]); };
             const RayPlanes ray{real3(all(6), all(7), all(8)), all(9), real3(all(10), all(11), all(12)), all(13)};
             if (!list_roots(newton, leaf, ray, real3(all(0), all(1), all(2)), real3(all(3), all(4), all(5)), lane,
-                            roots))
+                            roots, work_.newton_steps))
                 doubtful |= 1u << lane;
             most = std::max(most, roots.count[lane]);
         }
@@ -552,86 +413,6 @@ private:
                       real3(load(roots.nx[i]), load(roots.ny[i]), load(roots.nz[i])), hit);
         }
         return lanes_of(doubtful);
-    }
-
-    /// Of one ray, 16 rectangles of the leaf at once, and 16 of each in which that leaves something open. False: there
-    /// may be more roots than those listed.
-    HWY_ATTR HWY_NOINLINE bool list_roots(const NewtonPatch& newton, const LeafPlane& leaf, const RayPlanes& ray,
-                                          real3 origin, real3 direction, int lane, RootLists& roots)
-    {
-        struct Part {
-            float u, v; // its middle
-            int depth;
-        };
-        Part stack[kLanes * kDeepestSplit];
-        int waiting = 0, split = 0;
-        bool all = true;
-        stack[waiting++] = {leaf.middle.x, leaf.middle.y, 0};
-        const integer numbers = lane_numbers();
-        const real column = to_real(numbers & integer(3u)) * real(2.0f) - real(3.0f);
-        const real row = to_real(numbers >> integer(2u)) * real(2.0f) - real(3.0f);
-        while (waiting > 0) {
-            const Part part = stack[--waiting];
-            if (split++ == kMostSplits)
-                return false;
-            const bool last = part.depth + 1 == kDeepestSplit;
-            const scalar share = split_share(part.depth + 1);
-            Rectangle rectangle;
-            rectangle.half_side = scalar2(leaf.half_side.x * share, leaf.half_side.y * share);
-            rectangle.middle = real2(part.u + column * rectangle.half_side.x, part.v + row * rectangle.half_side.y);
-            const SurfacePoint s = evaluate(newton, rectangle.middle);
-            const SeenPoint seen = seen_point(s, ray);
-            work_.newton_steps += kLanes;
-            rectangle.bend = bend_around(leaf, ray, seen, share);
-            const mask met = !passes_by(leaf, ray, s, seen, share, newton.rounding);
-            const mask at_end = mask(last) || bends_as_ever(leaf, s, share);
-            const mask moving = met && (holds_one(rectangle.bend, real(1.0f)) || at_end || mask(part.depth == 0));
-            mask open = met;
-            if (any_lane(moving)) {
-                const Search search = find_root(newton, leaf, rectangle, ray, s, seen, moving);
-                open = met && !search.complete;
-                all = all && !any_lane(moving && search.blurred);
-                const Root root = end_of(newton, search, origin, direction);
-                all = list(root, lane, roots) && all;
-            }
-            all = all && !any_lane(open && at_end);
-            open = open && !at_end;
-            alignas(64) float u[kLanes], v[kLanes];
-            store(rectangle.middle.x, u);
-            store(rectangle.middle.y, v);
-            for (uint bits = lane_bits(open); bits != 0; bits &= bits - 1) {
-                const int i = __builtin_ctz(bits);
-                stack[waiting++] = {u[i], v[i], part.depth + 1};
-            }
-        }
-        return all;
-    }
-
-    /// Appends the roots that were found; false where they are too many.
-    HWY_ATTR static bool list(const Root& root, int lane, RootLists& roots)
-    {
-        alignas(64) float values[6][kLanes];
-        const real* const from[6] = {&root.t, &root.uv.x, &root.uv.y, &root.normal.x, &root.normal.y, &root.normal.z};
-        const uint found = lane_bits(root.found);
-        if (found == 0)
-            return true;
-        for (int i = 0; i < 6; ++i)
-            store(*from[i], values[i]);
-        float(*const to[6])[kLanes] = {roots.t, roots.u, roots.v, roots.nx, roots.ny, roots.nz};
-        for (uint bits = found; bits != 0; bits &= bits - 1) {
-            int& count = roots.count[lane];
-            if (count == kMostRoots)
-                return false;
-            for (int i = 0; i < 6; ++i)
-                to[i][count][lane] = values[i][__builtin_ctz(bits)];
-            ++count;
-        }
-        return true;
-    }
-
-    HWY_ATTR SurfacePoint evaluate(const NewtonPatch& patch, real2 uv) const
-    {
-        return patch.evaluate(source_, patch.first_control_point, patch.degree_u, patch.degree_v, uv);
     }
 
     HWY_ATTR static real2 clamp_to_domain(real2 uv)
