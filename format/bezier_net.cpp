@@ -1,39 +1,63 @@
+// Compiled once for each target by foreach_target.h, for what cuts nets; the best one is chosen at run time. Nothing is
+// fused, so all of them give the same bits.
+#define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3_DL)
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "format/bezier_net.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
 #include "format/bezier_net.h"
 
 #include <algorithm>
 
+HWY_BEFORE_NAMESPACE();
+namespace trimray {
+namespace HWY_NAMESPACE {
+namespace {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+constexpr hn::CappedTag<double, 4> kTag; // a Point4, or half of it
+constexpr int kLaneCount = int(hn::MaxLanes(kTag));
+
+/// Makes each line of control points along a direction that of its part over [0, t] (`lower`) or [t, 1].
+void cut(Net& net, int direction, double t, bool lower)
+{
+    // lines along u lie side by side and are cut at once, those along v one by one
+    const int lines = direction == 0 ? 1 : net.count_u, points = direction == 0 ? net.count_u : net.count_v;
+    const int next = direction == 0 ? 4 * net.count_v : 4; // numbers from a point to the next along its line
+    const auto of_first = hn::Set(kTag, 1 - t), of_second = hn::Set(kTag, t);
+    for (int line = 0; line < lines; ++line) {
+        double* p = net.points[size_t(line) * net.count_v].data();
+        for (int level = 1; level < points; ++level) {
+            // lower: from the end, p_i = (1 - t) p_(i-1) + t p_i; else p_i = (1 - t) p_i + t p_(i+1)
+            if (lower)
+                for (int i = points * next - kLaneCount; i >= level * next; i -= kLaneCount)
+                    hn::StoreU(of_first * hn::LoadU(kTag, p + i - next) + of_second * hn::LoadU(kTag, p + i), kTag,
+                               p + i);
+            else
+                for (int i = 0; i < (points - level) * next; i += kLaneCount)
+                    hn::StoreU(of_first * hn::LoadU(kTag, p + i) + of_second * hn::LoadU(kTag, p + i + next), kTag,
+                               p + i);
+        }
+    }
+}
+
+} // namespace
+} // namespace HWY_NAMESPACE
+} // namespace trimray
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+
 namespace trimray {
 namespace {
 
-/// The lines of control points along one direction, of a net of the given size.
-struct Lines {
-    int count = 0, step = 0, next_line = 0, points = 0;
-};
+HWY_EXPORT(cut);
 
-Lines lines_along(const Net& net, int direction)
-{
-    if (direction == 0)
-        return {net.count_v, net.count_v, 1, net.count_u};
-    return {net.count_u, 1, net.count_v, net.count_v};
-}
-
-/// Makes each line that of its part over [0, t] (`lower`) or [t, 1].
 void cut(Net& net, int direction, double t, bool lower)
 {
-    const Lines lines = lines_along(net, direction);
-    for (int line = 0; line < lines.count; ++line) {
-        Point4* p = &net.points[size_t(line) * lines.next_line];
-        const int n = lines.points;
-        for (int level = 1; level < n; ++level) {
-            const int from = lower ? n - 1 : 0, to = lower ? level - 1 : n - 1 - level, way = lower ? -1 : 1;
-            // lower: from the end, p_i = (1 - t) p_(i-1) + t p_i; else p_i = (1 - t) p_i + t p_(i+1)
-            for (int i = from; i != to + (lower ? 0 : 1); i += way) {
-                const int a = lower ? i - 1 : i, b = lower ? i : i + 1;
-                for (int c = 0; c < 4; ++c)
-                    p[i * lines.step][c] = (1 - t) * p[a * lines.step][c] + t * p[b * lines.step][c];
-            }
-        }
-    }
+    HWY_DYNAMIC_DISPATCH(cut)(net, direction, t, lower);
 }
 
 } // namespace
@@ -75,3 +99,5 @@ Net part_of(const Net& net, int direction, double lo, double hi)
 }
 
 } // namespace trimray
+
+#endif

@@ -292,12 +292,19 @@ struct WorstFirst {
     }
 };
 
+/// A patch that is split.
+struct Whole {
+    Net net;
+    std::array<double, 2> rounding; // derivative_rounding
+    double scale = 1;               // part units a patch unit
+};
+
 /// Sets the piece's bend and whether it is to be split for that. length: of its sides, in the part.
-void judge_bend(Piece& piece, const Net& patch, const double (&length)[2], const LeafOptions& options)
+void judge_bend(Piece& piece, const Whole& patch, const double (&length)[2], const LeafOptions& options)
 {
     std::array<double, 2> lo, hi;
     cell_range(piece.cell, lo, hi);
-    const std::array<LeafBend, 2> by_side = leaf_bend_by_side(patch, lo, hi);
+    const std::array<LeafBend, 2> by_side = leaf_bend_by_side(patch.net, patch.rounding, lo, hi);
     piece.bend = sum(by_side);
     // least_slope <= tan b where along + across / tan b <= 1/2
     const double b = options.leaf_slope_deg * (kPi / 180), per_slope = std::max(std::cos(b), 0.0) / std::sin(b);
@@ -321,13 +328,13 @@ void judge_bend(Piece& piece, const Net& patch, const double (&length)[2], const
     }
 }
 
-void judge(Piece& piece, const Net& patch, double scale, const LeafOptions& options, std::vector<Point3>& scratch)
+void judge(Piece& piece, const Whole& patch, const LeafOptions& options, std::vector<Point3>& scratch)
 {
     project(piece.net, scratch);
     const Shape s = measure(piece.net, scratch);
     double excess[2], length[2];
     for (int i = 0; i < 2; ++i) {
-        length[i] = s.length[i] * scale; // in the part
+        length[i] = s.length[i] * patch.scale; // in the part
         const double ease = std::clamp(std::sqrt(kSmallLeaf / length[i]), 1.0, kMostTurning);
         const double turning = s.turning[i] / (options.max_turning_rad * ease);
         const double aspect = length[i] > kShortestForAspect ? s.length[i] / (options.max_aspect * s.length[1 - i]) : 0;
@@ -345,19 +352,19 @@ void add_bezier_leaves(PackImage& image, uint patch_id, const LeafOptions& optio
     PatchRecord& patch = image.patches[patch_id];
     std::vector<Point3> scratch;
     std::vector<Piece> heap(1);
-    const Net patch_net = load_net(image, patch);
-    const std::array<double, 2> rounding = derivative_rounding(patch_net);
+    Whole whole{load_net(image, patch), {}, patch.scale};
+    whole.rounding = derivative_rounding(whole.net);
     for (int i = 0; i < 2; ++i)
-        patch.param[i] = std::nextafter(static_cast<float>(rounding[i]), HUGE_VALF);
-    heap[0].net = patch_net;
-    judge(heap[0], patch_net, patch.scale, options, scratch);
+        patch.param[i] = std::nextafter(static_cast<float>(whole.rounding[i]), HUGE_VALF);
+    heap[0].net = whole.net;
+    judge(heap[0], whole, options, scratch);
     const auto keep = [&](const Piece& piece) {
         LeafRecord leaf{};
         leaf.patch = patch_id;
         set_cell(piece.cell, leaf);
         std::array<double, 2> lo, hi;
         cell_range(piece.cell, lo, hi);
-        encode_leaf_bend(piece.bend ? *piece.bend : leaf_bend(patch_net, lo, hi), leaf);
+        encode_leaf_bend(piece.bend ? *piece.bend : leaf_bend(whole.net, lo, hi), leaf);
         project(piece.net, scratch);
         box_net(piece.net, scratch, leaf);
         leaves.push_back(leaf);
@@ -386,7 +393,7 @@ void add_bezier_leaves(PackImage& image, uint patch_id, const LeafOptions& optio
         ++upper.cell.index[piece.direction];
         for (Piece* half : {&piece, &upper}) {
             half->order = ++made;
-            judge(*half, patch_net, patch.scale, options, scratch);
+            judge(*half, whole, options, scratch);
             heap.push_back(std::move(*half));
             std::push_heap(heap.begin(), heap.end(), WorstFirst{});
         }

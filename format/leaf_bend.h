@@ -39,8 +39,9 @@ struct LeafBend {
 LeafBend leaf_bend(const Net& patch, const std::array<double, 2>& lo, const std::array<double, 2>& hi);
 
 /// The same as its two summands: what half a side along u adds, and one along v. Splitting about halves the one.
-std::array<LeafBend, 2> leaf_bend_by_side(const Net& patch, const std::array<double, 2>& lo,
-                                          const std::array<double, 2>& hi);
+/// `rounding`: derivative_rounding(patch).
+std::array<LeafBend, 2> leaf_bend_by_side(const Net& patch, const std::array<double, 2>& rounding,
+                                          const std::array<double, 2>& lo, const std::array<double, 2>& hi);
 LeafBend sum(const std::array<LeafBend, 2>& by_side);
 
 inline constexpr double kMostRounding = 1e6; // stands for all that is more

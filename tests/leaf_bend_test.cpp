@@ -8,6 +8,7 @@
 #include "tests/random_pack.h"
 
 #include <gtest/gtest.h>
+#include <hwy/targets.h>
 
 #include <algorithm>
 #include <cmath>
@@ -215,6 +216,33 @@ TEST(leaf_bend, a_leaf_half_as_long_bends_half_as_much)
         const LeafBend half = leaf_bend(net, {0.4375, 0.4375}, {0.5625, 0.5625});
         EXPECT_LT(half.along, 0.52 * whole.along);
         EXPECT_LT(half.across, 0.52 * whole.across);
+    }
+}
+
+TEST(leaf_bend, is_the_same_on_every_instruction_set)
+{
+    RandomSurfaces random(9);
+    for (int trial = 0; trial < 40; ++trial) {
+        const PackImage image = wavy_patch(random, random.integer(1, 15), random.integer(1, 15), trial % 2 == 1, 0.4);
+        const Net net = load_net(image, image.patches[0]);
+        const auto bend = [&](int64_t targets) {
+            hwy::SetSupportedTargetsForTest(targets); // 0: the best there is
+            hwy::GetChosenTarget().DeInit();
+            return leaf_bend_by_side(net, derivative_rounding(net), {0.25, 0.5}, {0.5, 0.75});
+        };
+        const std::array<LeafBend, 2> best = bend(0);
+        ASSERT_GT(best[0].along, 0);
+        for (const int64_t target : {int64_t(HWY_EMU128), int64_t(HWY_SSE4), int64_t(HWY_AVX2), int64_t(HWY_AVX3)}) {
+            hwy::SetSupportedTargetsForTest(0);
+            if ((hwy::SupportedTargets() & target) == 0)
+                continue;
+            const std::array<LeafBend, 2> here = bend(target);
+            for (int d = 0; d < 2; ++d) {
+                EXPECT_EQ(here[d].along, best[d].along) << hwy::TargetName(target);
+                EXPECT_EQ(here[d].across, best[d].across) << hwy::TargetName(target);
+            }
+        }
+        bend(0);
     }
 }
 

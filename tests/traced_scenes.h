@@ -18,6 +18,7 @@ namespace trimray {
 struct TracedScene {
     PackImage image;
     bool with_textures = true;
+    LeafOptions leaf_options;
 
     TracedScene()
     {
@@ -122,7 +123,7 @@ struct TracedScene {
             image.bounds_hi_mm[i] = 30;
         }
         image.world_scale_mm = 30;
-        derive_leaves(image, LeafOptions{});
+        derive_leaves(image, leaf_options);
         derive_trees(image);
         derive_cells(image);
         if (with_textures) {

@@ -14,6 +14,7 @@
 #include <numbers>
 #include <numeric>
 #include <random>
+#include <span>
 
 namespace trimray::hard {
 
@@ -71,6 +72,16 @@ struct RandomPatch {
     bool operator==(const RandomPatch&) const = default;
 };
 
+/// Of patch `number` of any run.
+inline Shape shape_of(uint32_t number)
+{
+    return Shape(number % kShapeCount);
+}
+inline Weighting weighting_of(uint32_t number)
+{
+    return Weighting(number / kShapeCount % kWeightingCount);
+}
+
 /// Patch `number` of the run with this seed, with a sight for each aim.
 inline std::array<RandomPatch, kAimCount> draw_patch(uint32_t seed, uint32_t number)
 {
@@ -84,8 +95,8 @@ inline std::array<RandomPatch, kAimCount> draw_patch(uint32_t seed, uint32_t num
     constexpr int kMostDegree = 15;
 
     RandomPatch patch;
-    patch.shape = Shape(number % kShapeCount);
-    patch.weighting = Weighting(number / kShapeCount % kWeightingCount);
+    patch.shape = shape_of(number);
+    patch.weighting = weighting_of(number);
     patch.degree_u = integer(1, kMostDegree);
     patch.degree_v = integer(1, kMostDegree);
     const int p = patch.degree_u, q = patch.degree_v;
@@ -173,10 +184,11 @@ inline CadSurface surface_of(const RandomPatch& patch)
 }
 
 /// The patch as the converter stores it.
-inline std::shared_ptr<const Scene> scene_of(const RandomPatch& patch)
+inline std::shared_ptr<const Scene> scene_of(const RandomPatch& patch, const LeafOptions& leaf_options = {})
 {
     TracedScene scene;
     scene.with_textures = false;
+    scene.leaf_options = leaf_options;
     PackImage& image = scene.image;
     for (int copy = 0; copy < (patch.shape == Shape::Coincident ? 2 : 1); ++copy) {
         FaceRecord face{};
@@ -301,9 +313,9 @@ inline Tally tally_picture(Tracer& tracer, const ClosestReference& closest, cons
 }
 
 /// Of one picture by the CPU tracer.
-inline Tally tally_of(const RandomPatch& patch)
+inline Tally tally_of(const RandomPatch& patch, const LeafOptions& leaf_options = {})
 {
-    const auto scene = scene_of(patch);
+    const auto scene = scene_of(patch, leaf_options);
     const auto tracer = make_cpu_tracer(scene);
     if (!tracer.ok()) {
         ADD_FAILURE() << tracer.error().where << ": " << tracer.error().detail;
@@ -399,11 +411,13 @@ inline std::vector<RandomPatch> simpler(const RandomPatch& patch)
 }
 
 /// The simplest patch that RapidCheck's search comes to from this one while `count` stays above 0.
-inline RandomPatch shrink(const RandomPatch& patch, Tally::Count count)
+inline RandomPatch shrink(const RandomPatch& patch, Tally::Count count, const LeafOptions& leaf_options = {})
 {
     const auto tree =
         rc::shrinkable::shrinkRecur(patch, [](const RandomPatch& p) { return rc::seq::fromContainer(simpler(p)); });
-    return rc::shrinkable::findLocalMin(tree, [count](const RandomPatch& p) { return tally_of(p)[count] > 0; }).first;
+    return rc::shrinkable::findLocalMin(tree,
+                                        [&](const RandomPatch& p) { return tally_of(p, leaf_options)[count] > 0; })
+        .first;
 }
 
 /// As a C++ expression, and the camera beside it.
@@ -427,13 +441,14 @@ inline std::string literal_of(const RandomPatch& patch)
 /// The pictures of one patch, by aim.
 using PatchTallies = std::array<Tally, kAimCount>;
 
-/// Of patches first, first + step, ... of a run, `count` of them, on all cores.
-inline std::vector<PatchTallies> tally_patches(uint32_t seed, uint32_t first, uint32_t count, uint32_t step = 1)
+/// Of these patches of a run, on all cores.
+inline std::vector<PatchTallies> tally_patches(uint32_t seed, std::span<const uint32_t> numbers,
+                                               const LeafOptions& leaf_options = {})
 {
-    std::vector<PatchTallies> out(count);
-    tbb::parallel_for(0u, count, [&](uint32_t k) {
-        const auto drawn = draw_patch(seed, first + k * step);
-        const auto scene = scene_of(drawn[0]);
+    std::vector<PatchTallies> out(numbers.size());
+    tbb::parallel_for(size_t{0}, numbers.size(), [&](size_t k) {
+        const auto drawn = draw_patch(seed, numbers[k]);
+        const auto scene = scene_of(drawn[0], leaf_options);
         const auto tracer = make_cpu_tracer(scene);
         if (!tracer.ok()) {
             ADD_FAILURE() << tracer.error().where << ": " << tracer.error().detail;

@@ -29,15 +29,16 @@ class random_patches : public testing::TestWithParam<Share> {};
 
 TEST_P(random_patches, are_traced_wrong_as_seldom_as_stated)
 {
-    const auto first = uint32_t(GetParam().shape);
-    const auto tallies = tally_patches(kSeed, first, kPatchesPerShape, kShapeCount);
-    const auto drawn = [&](uint32_t k) { return draw_patch(kSeed, first + k * kShapeCount); };
+    std::vector<uint32_t> numbers;
+    for (uint32_t k = 0; k < kPatchesPerShape; ++k)
+        numbers.push_back(uint32_t(GetParam().shape) + k * kShapeCount);
+    const auto tallies = tally_patches(kSeed, numbers);
     bool shown = false; // an example: one alone, for making it smaller takes a while
     for (const bool apart : {false, true}) {
         Tally all;
         std::vector<uint32_t> counted;
         for (uint32_t k = 0; k < kPatchesPerShape; ++k) {
-            if ((drawn(k)[0].weighting == Weighting::Wide) != apart)
+            if ((weighting_of(numbers[k]) == Weighting::Wide) != apart)
                 continue;
             counted.push_back(k);
             for (const Tally& tally : tallies[k])
@@ -47,7 +48,9 @@ TEST_P(random_patches, are_traced_wrong_as_seldom_as_stated)
             for (const uint32_t k : counted)
                 for (size_t aim = 0; aim < kAimCount; ++aim)
                     if (tallies[k][aim][count] > 0)
-                        return std::exchange(shown, true) ? "" : literal_of(shrink(drawn(k)[aim], count));
+                        return std::exchange(shown, true)
+                                   ? ""
+                                   : literal_of(shrink(draw_patch(kSeed, numbers[k])[aim], count));
             return "";
         };
         std::cout << (apart ? "weights apart:" : "weights alike:");
