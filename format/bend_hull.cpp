@@ -10,7 +10,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 
 HWY_BEFORE_NAMESPACE();
 namespace trimray {
@@ -26,23 +25,38 @@ constexpr Lanes kTag;
 constexpr int kLaneCount = int(hn::MaxLanes(kTag));
 
 constexpr int kMostPoints = int(kMaxDegree) + 1; // along one direction
+constexpr int kMostNumbers = (kMostPoints + 2) * (kMostPoints + kMostLanes + 1) + 1;
+
 /// (y_1, y_2, z, w) as a polynomial over [0, 1]^2 in scaled Bernstein form: coefficients times both binomials. Then to
 /// raise the degree and to multiply is to add shifted coefficients, and the binomials leave a quotient of two
-/// coefficients. Columns lie side by side, for loops that do several at once.
+/// coefficients. Columns lie side by side, and loops do several at once.
 /// Source: Farouki & Rajan 1988.
 struct Scaled {
     int count_u = 0, count_v = 0;
-    int stride = 0; // from row to row: the columns of the largest net and a border
-    double at[4][(kMostPoints + 2) * (kMostPoints + 2) + kMostLanes]; // a border of zeros around the net
+    int width = 0;              // of a row that loops write: room for one column more, in whole registers
+    double at[4][kMostNumbers]; // zeros around the net: a row and a column before, the rest after
 
-    double* row(int c, int i) { return at[c] + (i + 1) * stride + 1; }
-    const double* row(int c, int i) const { return at[c] + (i + 1) * stride + 1; }
-    /// Zeros, and room for that many rows and columns.
-    void clear(int rows, int columns)
+    double* row(int c, int i) { return at[c] + (i + 1) * (width + 1) + 1; }
+    const double* row(int c, int i) const { return at[c] + (i + 1) * (width + 1) + 1; }
+    /// Room for so many rows and columns, to be written, inside of zeros.
+    void resize(int rows, int columns, int row_width)
     {
-        stride = columns + 2;
-        for (auto& component : at)
-            std::fill_n(component, (rows + 2) * stride + kMostLanes, 0.0);
+        count_u = rows;
+        count_v = columns;
+        width = row_width;
+        for (int c = 0; c < 4; ++c) {
+            std::fill_n(row(c, -1) - 1, width + 1, 0.0);
+            for (int i = 0; i < rows; ++i)
+                row(c, i)[-1] = 0;
+            std::fill_n(row(c, rows) - 1, width + 2, 0.0);
+        }
+    }
+    /// Zeros, so many.
+    void clear(int rows, int columns, int row_width)
+    {
+        resize(rows, columns, row_width);
+        for (int c = 0; c < 4; ++c)
+            std::fill_n(row(c, 0), rows * (width + 1), 0.0);
     }
 };
 
@@ -56,9 +70,7 @@ void binomials(int degree, double (&row)[kMostPoints])
 /// The surface over the reach, homogeneous, moved to the frame's middle and turned into it.
 void turn(const Net& net, const BendFrame& f, Scaled& to)
 {
-    to.count_u = net.count_u;
-    to.count_v = net.count_v;
-    to.clear(net.count_u, net.count_v);
+    to.clear(net.count_u, net.count_v, (net.count_v + kLaneCount) / kLaneCount * kLaneCount);
     double share_u[kMostPoints], share_v[kMostPoints];
     binomials(net.count_u - 1, share_u);
     binomials(net.count_v - 1, share_v);
@@ -76,49 +88,37 @@ void turn(const Net& net, const BendFrame& f, Scaled& to)
 }
 
 /// to = scale d/du or d/dv from. With C_i = binomial(n, i) c_i the derivative is (i + 1) C_(i+1) - (n - i) C_i.
+/// Domain: degree 1 at least in that direction.
 void derive(const Scaled& from, int direction, double scale, Scaled& to)
 {
-    to.count_u = std::max(from.count_u - (direction == 0), 1);
-    to.count_v = std::max(from.count_v - (direction == 1), 1);
-    const int degree = (direction == 0 ? from.count_u : from.count_v) - 1;
-    if (degree == 0)
-        return;
+    to.resize(from.count_u - (direction == 0), from.count_v - (direction == 1), from.width);
+    const int degree = direction == 0 ? to.count_u : to.count_v, width = to.width;
+    const V by = hn::Set(kTag, scale);
     for (int c = 0; c < 4; ++c) {
         for (int i = 0; i < to.count_u; ++i) {
             const double *here = from.row(c, i), *next = direction == 0 ? from.row(c, i + 1) : here + 1;
-            double* HWY_RESTRICT out = to.row(c, i);
-            if (direction == 0)
-                for (int j = 0; j < to.count_v; ++j)
-                    out[j] = scale * ((i + 1) * next[j] - (degree - i) * here[j]);
-            else
-                for (int j = 0; j < to.count_v; ++j)
-                    out[j] = scale * ((j + 1) * next[j] - (degree - j) * here[j]);
+            double* out = to.row(c, i);
+            for (int j = 0; j < width; j += kLaneCount) {
+                const V k = direction == 0 ? hn::Set(kTag, i) : hn::Iota(kTag, j);
+                const V of_next = k + hn::Set(kTag, 1.0), of_here = hn::Set(kTag, degree) - k;
+                hn::StoreU(by * (of_next * hn::LoadU(kTag, next + j) - of_here * hn::LoadU(kTag, here + j)), kTag,
+                           out + j);
+            }
         }
     }
 }
 
-/// Raises the degrees until the counts are these: multiplies by (1 - t) + t. Domain: zeros around the net.
-void raise_to(Scaled& net, int count_u, int count_v)
+/// to = from with its degree raised by one: multiplied by (1 - t) + t.
+void raise(const Scaled& from, int direction, Scaled& to)
 {
-    for (; net.count_u < count_u; ++net.count_u) {
-        for (int c = 0; c < 4; ++c) {
-            for (int i = net.count_u; i > 0; --i) {
-                double* HWY_RESTRICT row = net.row(c, i);
-                const double* before = net.row(c, i - 1);
-                for (int j = 0; j < net.count_v; ++j)
-                    row[j] += before[j];
-            }
-        }
-    }
-    for (; net.count_v < count_v; ++net.count_v) {
-        for (int c = 0; c < 4; ++c) {
-            for (int i = 0; i < net.count_u; ++i) {
-                double* HWY_RESTRICT row = net.row(c, i);
-                double before[kMostPoints + 1];
-                std::copy_n(row - 1, net.count_v + 1, before);
-                for (int j = 0; j <= net.count_v; ++j)
-                    row[j] += before[j];
-            }
+    to.resize(from.count_u + (direction == 0), from.count_v + (direction == 1), from.width);
+    const int width = to.width;
+    for (int c = 0; c < 4; ++c) {
+        for (int i = 0; i < to.count_u; ++i) {
+            const double *here = from.row(c, i), *before = direction == 0 ? from.row(c, i - 1) : here - 1;
+            double* out = to.row(c, i);
+            for (int j = 0; j < width; j += kLaneCount)
+                hn::StoreU(hn::LoadU(kTag, here + j) + hn::LoadU(kTag, before + j), kTag, out + j);
         }
     }
 }
@@ -260,16 +260,24 @@ HWY_INLINE std::array<LeafBend, 2> bounds(const SecondOrder& s, const BendFrame&
 std::array<LeafBend, 2> bend_over_lanes(const Net& reach, const BendFrame& f)
 {
     SecondOrder s;
+    Scaled u, v, second, raised; // of the degrees that derivatives have
     turn(reach, f, s.value);
-    for (Scaled* net : {&s.u, &s.v, &s.uu, &s.uv, &s.vv})
-        net->clear(reach.count_u, reach.count_v);
-    derive(s.value, 0, f.per_side[0], s.u);
-    derive(s.value, 1, f.per_side[1], s.v);
-    derive(s.u, 0, f.per_side[0], s.uu);
-    derive(s.u, 1, f.per_side[1], s.uv);
-    derive(s.v, 1, f.per_side[1], s.vv);
-    for (Scaled* net : {&s.u, &s.v, &s.uu, &s.uv, &s.vv})
-        raise_to(*net, reach.count_u, reach.count_v);
+    derive(s.value, 0, f.per_side[0], u);
+    raise(u, 0, s.u);
+    derive(s.value, 1, f.per_side[1], v);
+    raise(v, 1, s.v);
+    const auto derive_again = [&](const Scaled& net, int first, int direction, Scaled& to) {
+        if ((direction == 0 ? net.count_u : net.count_v) == 1) { // a straight line
+            to.clear(s.value.count_u, s.value.count_v, s.value.width);
+            return;
+        }
+        derive(net, direction, f.per_side[direction], second);
+        raise(second, first, raised);
+        raise(raised, direction, to);
+    };
+    derive_again(u, 0, 0, s.uu);
+    derive_again(u, 0, 1, s.uv);
+    derive_again(v, 1, 1, s.vv);
     return reach.rational() ? bounds<true>(s, f) : bounds<false>(s, f);
 }
 
