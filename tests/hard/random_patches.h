@@ -47,6 +47,8 @@ enum class Aim {
 inline constexpr const char* kAimNames[] = {"Inside", "Border", "Grazing"};
 inline constexpr size_t kAimCount = 3;
 
+inline constexpr uint32_t kPixels = 8; // a side of a picture
+
 /// A square picture whose middle is at a point of the surface.
 struct Sight {
     Aim aim = Aim::Inside;
@@ -55,7 +57,7 @@ struct Sight {
     double distance_mm = 50;
     double pixel_mm = 0.1;                   // at the point
     std::array<double, 2> moved_px = {0, 0}; // of the middle from the point
-    uint32_t pixels = 8;                     // a side
+    uint32_t pixels = kPixels;               // a side
 
     bool operator==(const Sight&) const = default;
 };
@@ -83,7 +85,7 @@ inline Weighting weighting_of(uint32_t number)
 }
 
 /// Patch `number` of the run with this seed, with a sight for each aim.
-inline std::array<RandomPatch, kAimCount> draw_patch(uint32_t seed, uint32_t number)
+inline std::array<RandomPatch, kAimCount> draw_patch(uint32_t seed, uint32_t number, uint32_t pixels = kPixels)
 {
     std::seed_seq seeds{seed, number};
     std::mt19937_64 random(seeds);
@@ -157,6 +159,7 @@ inline std::array<RandomPatch, kAimCount> draw_patch(uint32_t seed, uint32_t num
     for (size_t aim = 0; aim < kAimCount; ++aim) {
         Sight& sight = patch.sight;
         sight.aim = Aim(aim);
+        sight.pixels = pixels;
         sight.u = uniform(0, 1);
         sight.v = uniform(0, 1);
         if (sight.aim == Aim::Border) {
@@ -443,11 +446,11 @@ using PatchTallies = std::array<Tally, kAimCount>;
 
 /// Of these patches of a run, on all cores.
 inline std::vector<PatchTallies> tally_patches(uint32_t seed, std::span<const uint32_t> numbers,
-                                               const LeafOptions& leaf_options = {})
+                                               const LeafOptions& leaf_options = {}, uint32_t pixels = kPixels)
 {
     std::vector<PatchTallies> out(numbers.size());
     tbb::parallel_for(size_t{0}, numbers.size(), [&](size_t k) {
-        const auto drawn = draw_patch(seed, numbers[k]);
+        const auto drawn = draw_patch(seed, numbers[k], pixels);
         const auto scene = scene_of(drawn[0], leaf_options);
         const auto tracer = make_cpu_tracer(scene);
         if (!tracer.ok()) {

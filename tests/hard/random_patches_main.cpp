@@ -1,6 +1,6 @@
-// random_patches [--count N] [--first N] [--seed N] [--weights KIND] [--leaf-budget N] [--shrink N]: random patches
-// against the reference for closest hits. Prints what is wrong by shape and aim and by weights, the patches that fail,
-// and some of them made smaller.
+// random_patches [--count N] [--first N] [--seed N] [--weights KIND] [--pixels N] [--leaf-budget N] [--shrink N]:
+// random patches against the reference for closest hits. Prints what is wrong by shape and aim and by weights, the
+// patches that fail, and some of them made smaller.
 #include "tests/hard/random_patches.h"
 
 #include <CLI/CLI.hpp>
@@ -15,7 +15,7 @@ using namespace trimray;
 using namespace trimray::hard;
 
 struct Request {
-    uint32_t count = 100000, first = 0, seed = 1, shrink = 0;
+    uint32_t count = 100000, first = 0, seed = 1, pixels = kPixels, shrink = 0;
     std::vector<Weighting> weights; // none: all
     LeafOptions leaf_options;
 };
@@ -50,7 +50,7 @@ void print_faulty(const std::vector<uint32_t>& numbers, const std::vector<PatchT
         for (size_t aim = 0; aim < kAimCount; ++aim) {
             if (tallies[k][aim][count] == 0)
                 continue;
-            const RandomPatch patch = draw_patch(request.seed, numbers[k])[aim];
+            const RandomPatch patch = draw_patch(request.seed, numbers[k], request.pixels)[aim];
             fmt::print("{} {} in patch {}, {}, {}, weights {}, degrees {} and {}\n", tallies[k][aim][count],
                        kCountNames[count], numbers[k], kShapeNames[size_t(patch.shape)], kAimNames[aim],
                        kWeightingNames[size_t(patch.weighting)], patch.degree_u, patch.degree_v);
@@ -72,6 +72,7 @@ int main(int argc, char** argv)
     app.add_option("--weights", request.weights, "Patches with these weights alone: None, Mild, Wide")
         ->transform(CLI::CheckedTransformer(std::map<std::string, Weighting>{
             {"None", Weighting::None}, {"Mild", Weighting::Mild}, {"Wide", Weighting::Wide}}));
+    app.add_option("--pixels", request.pixels, "A side of a picture")->check(CLI::Range(1u, 1024u));
     app.add_option("--leaf-budget", request.leaf_options.max_leaves_per_patch, "Most leaves of a Bezier patch");
     app.add_option("--shrink", request.shrink, "Patches of each shape and fault to make smaller and print");
     CLI11_PARSE(app, argc, argv);
@@ -82,7 +83,8 @@ int main(int argc, char** argv)
     constexpr size_t kAtOnce = 500;
     while (tallies.size() < numbers.size()) {
         const auto next = std::span(numbers).subspan(tallies.size());
-        const auto more = tally_patches(request.seed, next.first(std::min(kAtOnce, next.size())), request.leaf_options);
+        const auto more = tally_patches(request.seed, next.first(std::min(kAtOnce, next.size())), request.leaf_options,
+                                        request.pixels);
         tallies.insert(tallies.end(), more.begin(), more.end());
         if (isatty(STDERR_FILENO))
             fmt::print(stderr, "\r{} of {} patches", tallies.size(), numbers.size());
