@@ -1,5 +1,5 @@
-// Compiled once for each target by foreach_target.h; the best one is chosen at run time. Nothing is fused or
-// approximated, so all of them give the same bits.
+// The hulls of a leaf's second derivatives, several columns of a net at a time. Compiled once for each target by
+// foreach_target.h; the best one is chosen at run time. Nothing is fused or approximated, so all give the same bits.
 #define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3_DL)
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "format/bend_hull.cpp"
