@@ -1,4 +1,5 @@
 #include "runtime/bench_closest.h"
+#include "runtime/bench_moving.h"
 #include "runtime/bench_trims.h"
 #include "runtime/command_json.h"
 #include "runtime/command_report.h"
@@ -29,6 +30,13 @@ struct ClosestArguments {
     std::vector<std::string> packs;
     std::string size = "640x360";
     ClosestBenchOptions options;
+    bool json = false;
+};
+
+struct MovingArguments {
+    std::vector<std::string> packs;
+    std::string size = "640x360";
+    MovingBenchOptions options;
     bool json = false;
 };
 
@@ -151,6 +159,27 @@ void print_view(const std::string& pack, const ClosestView& view)
     fmt::print("\n");
 }
 
+Json figures_json(const MovingFigures& figures)
+{
+    return {{"frame_ms", figures.frame_ms},
+            {"node_visits", figures.node_visits},
+            {"leaf_visits", figures.leaf_visits},
+            {"newton_steps", figures.newton_steps}};
+}
+
+void print_moving(const std::string& pack, const MovingReport& report)
+{
+    fmt::print("{}: {:.3f} times as fast with reuse; {} pixels differ\n", printable(pack), report.speedup,
+               report.differing_pixels);
+    fmt::print("{:<10}{:>10}{:>12}{:>13}{:>11}\n", "reuse", "frame ms", "nodes/ray", "leaves/ray", "steps/ray");
+    for (const bool reuse : {false, true}) {
+        const MovingFigures& f = reuse ? report.reusing : report.plain;
+        fmt::print("{:<10}{:>10.2f}{:>12.3f}{:>13.3f}{:>11.3f}\n", reuse ? "last hits" : "none", f.frame_ms,
+                   f.node_visits, f.leaf_visits, f.newton_steps);
+    }
+    fmt::print("\n");
+}
+
 /// What is being done, on a terminal only.
 void show_progress(const std::string& pack, const std::string& text)
 {
@@ -269,12 +298,56 @@ int run_bench_closest(ClosestArguments arguments)
     return kExitOk;
 }
 
-/// What both benches ask for.
+int run_bench_moving(MovingArguments arguments)
+{
+    const Result<PictureSize> size = parse_size(arguments.size, 1);
+    if (!size.ok())
+        return report_error(size.error());
+    MovingBenchOptions& options = arguments.options;
+    if (const Status known = check_choice(device_choice(), options.device); !known.ok())
+        return report_error(known.error());
+    options.width = size->width;
+    options.height = size->height;
+
+    Json packs = Json::array();
+    std::string device;
+    const auto bench = [&](const auto& scene, const auto& progress) { return bench_moving(scene, options, progress); };
+    const auto take = [&](const std::string& pack, const MovingReport& report) {
+        device = report.device;
+        packs.push_back({{"pack", pack},
+                         {"camera", camera_json(report.camera)},
+                         {"speedup", report.speedup},
+                         {"differing_pixels", report.differing_pixels},
+                         {"plain", figures_json(report.plain)},
+                         {"reusing", figures_json(report.reusing)}});
+        if (!arguments.json)
+            print_moving(pack, report);
+    };
+    if (const int code = bench_each(arguments.packs, bench, take); code != kExitOk)
+        return code;
+    if (arguments.json)
+        print_json({{"device", device},
+                    {"width", size->width},
+                    {"height", size->height},
+                    {"pictures", options.pictures},
+                    {"degrees", options.degrees},
+                    {"packs", packs}});
+    return kExitOk;
+}
+
+/// What all benches ask for.
 template <class Arguments>
-void add_common(CLI::App& command, Arguments& a)
+void add_packs(CLI::App& command, Arguments& a)
 {
     command.add_option("PACK", a.packs, "Scene packs (.tray)")->required();
     command.add_option("--size", a.size, "WIDTHxHEIGHT in pixels")->capture_default_str();
+    command.add_flag("--json", a.json, "Print one JSON object: all figures by pack and view");
+}
+
+/// What those on the CPU tracer ask for beside.
+template <class Arguments>
+void add_cpu_rounds(CLI::App& command, Arguments& a)
+{
     command.add_option("--rounds", a.options.rounds, "How often each setting is timed; medians are reported")
         ->capture_default_str()
         ->check(CLI::Range(1u, 10000u));
@@ -282,14 +355,14 @@ void add_common(CLI::App& command, Arguments& a)
         ->capture_default_str()
         ->check(CLI::Range(0u, 1024u));
     command.add_option("--instruction-set", a.options.instruction_set, "avx512, avx2 or sse4; default: the best");
-    command.add_flag("--json", a.json, "Print one JSON object: all figures by pack and view");
 }
 
 void register_bench_closest(CLI::App& bench, int& exit_code)
 {
     CLI::App* closest = bench.add_subcommand("closest", "Time and errors of both policies for closest hits");
     const auto a = std::make_shared<ClosestArguments>();
-    add_common(*closest, *a);
+    add_packs(*closest, *a);
+    add_cpu_rounds(*closest, *a);
     closest->add_option("--views", a->options.views, "iso, front, back, left, right, top and bottom, with commas")
         ->delimiter(',')
         ->capture_default_str();
@@ -309,18 +382,47 @@ void register_bench_closest(CLI::App& bench, int& exit_code)
     closest->callback([a, &exit_code] { exit_code = run_bench_closest(*a); });
 }
 
+void register_bench_moving(CLI::App& bench, int& exit_code)
+{
+    CLI::App* moving = bench.add_subcommand("moving", "What a moving camera gains from the last picture's hits");
+    const auto a = std::make_shared<MovingArguments>();
+    add_packs(*moving, *a);
+    moving
+        ->add_option("--degrees", a->options.degrees,
+                     "How far the camera turns about the model from picture to picture")
+        ->capture_default_str()
+        ->check(CLI::Range(-360.0, 360.0));
+    moving->add_option("--frames", a->options.pictures, "How many pictures are measured, after one to begin from")
+        ->capture_default_str()
+        ->check(CLI::Range(1u, 10000u));
+    moving->add_option("--device", a->options.device, "auto, cpu, vulkan or reference; only vulkan reuses hits")
+        ->capture_default_str();
+    moving->footer(
+        "Each picture is traced with reuse (each ray searches first where the last picture suggests, and its hit "
+        "there\n"
+        "bounds the search) and without, in turns. Times are medians; work is a ray's, in the mean over the pictures.\n"
+        "Pixels that differ in any channel are counted.\n\n"
+        "Examples:\n"
+        "  trimray bench moving model.tray\n"
+        "  trimray bench moving part.tray hull.tray --degrees 0.5 --size 1920x1080 --json");
+    moving->callback([a, &exit_code] { exit_code = run_bench_moving(*a); });
+}
+
 } // namespace
 
 void register_bench(CLI::App& app, int& exit_code)
 {
     CLI::App* bench = app.add_subcommand("bench", "Measure a part of the tracer on packs");
     bench->require_subcommand(1);
-    bench->footer("Examples:\n  trimray bench trims model.tray\n  trimray bench closest model.tray\n\n'trimray bench "
+    bench->footer("Examples:\n  trimray bench trims model.tray\n  trimray bench closest model.tray\n  "
+                  "trimray bench moving model.tray\n\n'trimray bench "
                   "trims --help' describes the first.");
     register_bench_closest(*bench, exit_code);
+    register_bench_moving(*bench, exit_code);
     CLI::App* trims = bench->add_subcommand("trims", "Time and errors of every trim mode, source, layout and memory");
     const auto a = std::make_shared<BenchArguments>();
-    add_common(*trims, *a);
+    add_packs(*trims, *a);
+    add_cpu_rounds(*trims, *a);
     trims
         ->add_option("--views", a->options.views,
                      "iso, front, back, left, right, top, bottom and close-up, with commas")

@@ -163,6 +163,8 @@ std::vector<EffectItem> effect_plan(const PackImage& image, const RenderOptions&
     else if (slopes.flagged > 0)
         plan.push_back({"leaf-parts", fmt::format("{} flagged, of {}: no ray is proved to meet them once",
                                                   counted(slopes.flagged, "leaf is", "leaves are"), slopes.leaves)});
+    if (options.reuse_last && options.closest == ClosestPolicy::Certified)
+        plan.push_back({"reused-hits", "asked for: rays search first where the last picture suggests, through Vulkan"});
     if (options.shade) {
         plan.push_back({"shading", "the picture is asked for, not hits alone"});
         add_drawing(image, options, plan);

@@ -21,6 +21,7 @@
 #include <cstring>
 #include <deque>
 #include <functional>
+#include <initializer_list>
 #include <limits>
 #include <utility>
 
@@ -45,6 +46,11 @@ constexpr uint32_t kMostRetries = 4096;
 
 // Larger nets are read from the buffer on the software driver too: so many floats lie beside each invocation
 constexpr uint32_t kMostLocalFloats = 1024;
+
+bool reuses_hits(const RenderOptions& options)
+{
+    return options.reuse_last && options.closest == ClosestPolicy::Certified;
+}
 
 struct QueryPool {
     const VulkanDevice* device = nullptr;
@@ -75,9 +81,12 @@ private:
     Result<ComputePipeline*> pipeline(TrimMode trim, const RenderOptions& options, bool count);
     Status prepare_frame(const FrameSetup& setup, uint32_t rows_per_band);
     Status prepare_edges(const RenderOptions& options, uint32_t rows_per_band);
+    Status prepare_hits(std::initializer_list<uint32_t> bindings, size_t pixels, size_t pixel_bytes,
+                        const char* option);
     Status prepare_kept(const RenderOptions& options);
-    Status forget_kept();
-    Status clear_counts();
+    Result<bool> prepare_last_hits(const RenderOptions& options);
+    Status fill(uint32_t binding, uint32_t word);
+    Status forget_kept() { return fill(kBindKept, std::bit_cast<uint32_t>(kNothingKept)); }
     Result<std::array<uint64_t, kFrameCounts>> read_counts();
     Result<double> time_dispatch(const ComputePipeline& pipeline, const FrameView& view, uint32_t groups_x,
                                  uint32_t groups_y);
@@ -102,7 +111,8 @@ private:
     bool edges_wanted_ = false;
     bool has_border_cells_ = false; // on the device, once a picture asked for borders
     EdgeMap edge_map_;
-    VulkanBuffer retries_upload_; // of kMostRetries indices
+    std::array<uint32_t, 2> next_hits_size_{}; // of the picture whose hits kBindNextHits holds; 0 x 0: of none
+    VulkanBuffer retries_upload_;              // of kMostRetries indices
     VulkanBuffer counts_readback_;
     QueryPool timestamps_;
     std::deque<std::pair<Specialisation, ComputePipeline>> pipelines_; // pointers handed out stay good
@@ -174,7 +184,7 @@ Result<ComputePipeline*> VulkanTracer::pipeline(TrimMode trim, const RenderOptio
     const bool stochastic = options.closest == ClosestPolicy::Stochastic;
     constants[kSpecFeatures] = facts_.features | (options.shade ? kFeatureShade : 0) | (count ? kFeatureCount : 0) |
                                (edges_wanted_ ? kFeatureEdges : 0) | (stochastic ? kFeatureStochastic : 0) |
-                               (keeps_hits(options) ? kFeatureKept : 0);
+                               (keeps_hits(options) ? kFeatureKept : 0) | (reuses_hits(options) ? kFeatureReuse : 0);
     constants[kSpecStackSize] = facts_.stack_size;
     if (device_->is_software()) {
         constants[kSpecLocalFloats] = facts_.largest_net_floats <= kMostLocalFloats ? facts_.largest_net_floats : 0;
@@ -248,37 +258,59 @@ Status VulkanTracer::prepare_edges(const RenderOptions& options, uint32_t rows_p
     return Done{};
 }
 
-// Makes the buffer of what pixels keep from frame to frame, if that there is too small. A picture of one frame, or
-// certified, has one element.
-Status VulkanTracer::prepare_kept(const RenderOptions& options)
+// Makes buffers of one record a pixel, if those there are too small. `option`: what asks for them.
+Status VulkanTracer::prepare_hits(std::initializer_list<uint32_t> bindings, size_t pixels, size_t pixel_bytes,
+                                  const char* option)
 {
-    const size_t pixels = keeps_hits(options) ? size_t{options.width} * options.height : 1;
-    const size_t bytes = pixels * sizeof(KeptHit);
-    if (buffers_[kBindKept].size_bytes() >= bytes)
-        return Done{};
+    const size_t bytes = pixels * pixel_bytes;
     if (const uint32_t most = device_->properties().limits.maxStorageBufferRange; bytes > most)
-        return Error{ErrorCode::Usage, "--frames",
-                     fmt::format("{} pixels keep their hits from frame to frame; this device holds those of {}", pixels,
-                                 most / sizeof(KeptHit))};
-    Result<VulkanBuffer> kept = VulkanBuffer::create(*device_, BufferUse::Storage, bytes, "the hits kept");
-    if (!kept)
-        return kept.error();
-    buffers_[kBindKept] = std::move(*kept);
+        return Error{
+            ErrorCode::Usage, option,
+            fmt::format("the hits of {} pixels are kept; this device holds those of {}", pixels, most / pixel_bytes)};
+    for (const uint32_t binding : bindings) {
+        if (buffers_[binding].size_bytes() >= bytes)
+            continue;
+        Result<VulkanBuffer> hits = VulkanBuffer::create(*device_, BufferUse::Storage, bytes, "the hits kept");
+        if (!hits)
+            return hits.error();
+        buffers_[binding] = std::move(*hits);
+    }
     return Done{};
 }
 
-Status VulkanTracer::forget_kept()
+// A picture of one frame, or certified, keeps one element.
+Status VulkanTracer::prepare_kept(const RenderOptions& options)
 {
-    return device_->run([&](VkCommandBuffer commands) {
-        device_->vk().vkCmdFillBuffer(commands, buffers_[kBindKept].handle(), 0, VK_WHOLE_SIZE,
-                                      std::bit_cast<uint32_t>(kNothingKept));
-    });
+    const size_t pixels = keeps_hits(options) ? size_t{options.width} * options.height : 1;
+    return prepare_hits({kBindKept}, pixels, sizeof(KeptHit), "--frames");
 }
 
-Status VulkanTracer::clear_counts()
+// Makes what the last picture left what this one begins from. Returns whether there was one of this size. All frames of
+// a picture begin from the same.
+Result<bool> VulkanTracer::prepare_last_hits(const RenderOptions& options)
+{
+    const bool reuse = reuses_hits(options);
+    const size_t pixels = reuse ? size_t{options.width} * options.height : 1;
+    if (const Status ready =
+            prepare_hits({kBindLastHits, kBindNextHits}, pixels, sizeof(LastHit), "RenderOptions::reuse_last");
+        !ready)
+        return ready.error();
+    if (!reuse)
+        return false;
+    const bool has_last = std::exchange(next_hits_size_, {}) == std::array{options.width, options.height};
+    if (has_last) {
+        std::swap(buffers_[kBindLastHits], buffers_[kBindNextHits]);
+        return true;
+    }
+    if (const Status none = fill(kBindLastHits, kNoLeaf); !none)
+        return none.error();
+    return false;
+}
+
+Status VulkanTracer::fill(uint32_t binding, uint32_t word)
 {
     return device_->run([&](VkCommandBuffer commands) {
-        device_->vk().vkCmdFillBuffer(commands, buffers_[kBindCounts].handle(), 0, VK_WHOLE_SIZE, 0);
+        device_->vk().vkCmdFillBuffer(commands, buffers_[binding].handle(), 0, VK_WHOLE_SIZE, word);
     });
 }
 
@@ -525,6 +557,9 @@ Result<Frame> VulkanTracer::render(const RenderOptions& options, RenderStats& st
         return ready.error();
     if (const Status ready = prepare_kept(options); !ready)
         return ready.error();
+    const Result<bool> reused_last = prepare_last_hits(options);
+    if (!reused_last)
+        return reused_last.error();
 
     // With one frame it counts its work itself; with more an untimed one before them does
     const uint32_t frames = std::max(options.frames, 1u);
@@ -544,7 +579,7 @@ Result<Frame> VulkanTracer::render(const RenderOptions& options, RenderStats& st
     if (const Result<double> warm = time_dispatch(**timed, setup->view, 1, 1); !warm)
         return warm.error();
 
-    if (const Status cleared = clear_counts(); !cleared)
+    if (const Status cleared = fill(kBindCounts, 0); !cleared)
         return cleared.error();
     FrameView view = setup->view;
     const auto choose_start = [&view](uint32_t frame) {
@@ -574,6 +609,7 @@ Result<Frame> VulkanTracer::render(const RenderOptions& options, RenderStats& st
     stats = RenderStats{};
     stats.device = device_->name();
     stats.trim = *trim;
+    stats.reused_last = *reused_last;
     stats.kd_bytes = *trim == TrimMode::Kd ? kd_bytes_ : 0;
     stats.border_bytes = edges_wanted_ ? buffers_[kBindBorders].size_bytes() : 0;
     for (uint32_t i = 0; i < frames; ++i) {
@@ -600,6 +636,8 @@ Result<Frame> VulkanTracer::render(const RenderOptions& options, RenderStats& st
         static_cast<uint64_t>(std::count(frame.certified.begin(), frame.certified.end(), uint8_t{0}));
     if (const Status valid = device_->validation_status(); !valid)
         return valid.error();
+    if (reuses_hits(options))
+        next_hits_size_ = {options.width, options.height};
     return frame;
 }
 

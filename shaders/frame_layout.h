@@ -80,6 +80,14 @@ struct KeptHit {
     uint instance;
 };
 
+// What a picture leaves for the next one to begin from (shaders/last_hits.glsl)
+struct LastHit {
+    float point[3]; // the top tree's units; only hints at where to look
+    uint leaf;      // kNoLeaf: the ray met nothing, or there was no picture
+    uint instance;
+};
+TRIMRAY_CONST uint kNoLeaf = 0xffffffffu;
+
 // Sums over a frame as pairs of words, low word first; kCount is the pair.
 TRIMRAY_CONST uint kCountRays = 0u;
 TRIMRAY_CONST uint kCountNodes = 1u;
@@ -111,6 +119,7 @@ TRIMRAY_CONST uint kFeatureEdges = 16u;      // edge words of each pixel are wan
 TRIMRAY_CONST uint kFeatureRims = 32u;       // some face has a rim
 TRIMRAY_CONST uint kFeatureStochastic = 64u; // ClosestPolicy::Stochastic
 TRIMRAY_CONST uint kFeatureKept = 128u;      // ... in more frames than one
+TRIMRAY_CONST uint kFeatureReuse = 256u;     // RenderOptions::reuse_last
 
 TRIMRAY_CONST uint kGroupSide = 8u; // workgroups are 8 x 8 pixels
 
@@ -137,13 +146,17 @@ TRIMRAY_CONST uint kBindKdRuns = 17u;
 TRIMRAY_CONST uint kBindKdPoints = 18u;
 TRIMRAY_CONST uint kBindKdFaces = 19u;
 TRIMRAY_CONST uint kBindKept = 20u; // a KeptHit a pixel of the picture; of one element without kFeatureKept
-TRIMRAY_CONST uint kFrameBindings = 21u;
+// a LastHit a pixel of the picture; of one element without kFeatureReuse
+TRIMRAY_CONST uint kBindLastHits = 21u; // the last picture's
+TRIMRAY_CONST uint kBindNextHits = 22u; // this one's, for the next
+TRIMRAY_CONST uint kFrameBindings = 23u;
 
 #ifdef __cplusplus
 static_assert(sizeof(FrameView) == 116);
 static_assert(sizeof(FrameInstance) == 144);
 static_assert(sizeof(FramePixel) == 52);
 static_assert(sizeof(KeptHit) == 32);
+static_assert(sizeof(LastHit) == 20);
 } // namespace trimray
 #endif
 

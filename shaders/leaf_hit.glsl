@@ -31,6 +31,8 @@ struct Hit {
     uint instance;
     float doubt; // from where on a leaf may hold hits that were not found, as `past`; kHuge: there is none
     bool back;   // it may be a rim's
+    bool own;    // it lies in its leaf, not beside it
+    float slack; // rounding of `past`
 };
 
 // A rim's back counts as a surface first, for few rays meet one: where it is what they see they are traced again.
@@ -169,30 +171,42 @@ bool inside_face(uint face_id, FaceRecord face, vec2 uv, bool beside_rim)
     return true;
 }
 
-// In front of the eye and not behind the nearest hit
-bool in_range(PatchRay ray, float t, Hit hit)
+// A hit of the ray's patch this much nearer or farther than the nearest so far is as near: the same whichever came first
+float as_near(PatchRay ray, Hit hit)
+{
+    return max(ray.slack, hit.slack);
+}
+
+// In front of the eye and not behind the nearest hit; `blur` goes on top of what is as near
+bool in_range(PatchRay ray, float t, float blur, Hit hit)
 {
     float past = ray.past + t;
-    return t < kHuge && past > -view.tau_ref && past < hit.past + ray.slack;
+    return t < kHuge && past > -view.tau_ref && past < hit.past + (as_near(ray, hit) + blur);
 }
 
 // Takes the root at t if it is in the face's domain, inside its trims and nearer than what was found. Of two hits
-// within rounding the one of the lower instance and leaf stays, whatever the order. `back`: it may be a rim's.
+// within rounding one that lies in its leaf stays, for no bound hides that leaf, then the one of the lower instance and
+// leaf, whatever the order. `back`: it may be a rim's; `blur`: as in in_range.
 void offer(PatchRay ray, uint face_id, FaceRecord face, uint leaf, uint instance, float t, vec2 uv_patch, vec2 uv_face,
-           bool back, inout Hit hit)
+           bool back, bool own, float blur, inout Hit hit)
 {
     vec2 off = abs(uv_face - 0.5f);
     if (max(off.x, off.y) > 0.5f + kDomainSlack)
         return;
     float past = ray.past + t;
     bool first = instance < hit.instance || (instance == hit.instance && leaf < hit.leaf);
-    if (!(past < hit.past + (first ? ray.slack : -ray.slack)))
+    if (own != hit.own)
+        first = own;
+    float near = as_near(ray, hit) + blur;
+    if (!(past < hit.past + (first ? near : -near)))
         return;
     vec2 uv = clamp(uv_face, vec2(0.0f), vec2(kUvBelowOne));
     if (!inside_face(face_id, face, uv, back && rims_cut))
         return;
     hit.past = past;
     hit.back = back;
+    hit.own = own;
+    hit.slack = ray.slack;
     hit.t = t;
     hit.uv_face = uv;
     hit.uv_patch = uv_patch;
@@ -273,12 +287,13 @@ void native_hit(PatchRay ray, PatchRecord patch, FaceRecord face, uint kind, uin
     if (touch < kHuge && (from > -view.tau_ref || touch <= -kHuge))
         hit.doubt = min(hit.doubt, from);
     for (int i = 0; i < 4; ++i) {
-        if (!in_range(ray, roots[i], hit))
+        if (!in_range(ray, roots[i], 0.0f, hit))
             continue;
         vec3 p = ray.origin + roots[i] * ray.direction;
         vec2 uv_patch = native_uv(kind, patch, p);
         bool back = rims && dot(ray.direction, outward(patch, face, native_normal(kind, patch, p))) > 0.0f;
-        offer(ray, patch.face, face, leaf, instance, roots[i], uv_patch, face_uv(patch, kind, uv_patch), back, hit);
+        offer(ray, patch.face, face, leaf, instance, roots[i], uv_patch, face_uv(patch, kind, uv_patch), back, true,
+              0.0f, hit); // alike from all leaves of its patch
     }
     iterations += 4u;
 }
@@ -331,24 +346,32 @@ float farther(vec2 d, vec2 half_side)
 }
 
 // What a search ended at; accepted anywhere on the patch, so that leaves leave no gaps
-void offer_end(PatchRay ray, PatchRecord patch, FaceRecord face, NewtonPatch newton, Search search, uint leaf,
-               uint instance, bool rims, inout Hit hit)
+void offer_end(PatchRay ray, PatchRecord patch, FaceRecord face, NewtonPatch newton, LeafBox box, Search search,
+               uint leaf, uint instance, bool rims, inout Hit hit)
 {
     if (!search.settled)
         return;
     NewtonRoot root = newton_root(search.s, search.next, search.uv, search.exact, ray.origin, ray.direction);
-    vec2 off = abs(root.uv - 0.5f) - patch_overlap(root_blur(search.seen, newton.rounding));
-    if (max(off.x, off.y) > 0.5f || !in_range(ray, root.t, hit))
+    vec2 overlap = patch_overlap(root_blur(search.seen, newton.rounding));
+    vec2 within = clamp(root.uv, 0.0f, 1.0f);
+    bool own = all(greaterThanEqual(within, box.uv_lo)) && all(lessThanEqual(within, box.uv_hi));
+    // a leaf beside it finds the same root elsewhere along the ray, by as much as rounding moves it on the patch
+    float blur = 0.0f;
+    if (own != hit.own)
+        blur = (overlap.x * length(search.s.du) + overlap.y * length(search.s.dv)) / length(ray.direction);
+    vec2 off = abs(root.uv - 0.5f) - overlap;
+    if (max(off.x, off.y) > 0.5f || !in_range(ray, root.t, blur, hit))
         return;
     bool back = false;
     if (rims) {
-        vec2 within = clamp(search.uv, 0.0f, 1.0f); // beyond a pole's side a patch is turned inside out
+        within = clamp(search.uv, 0.0f, 1.0f); // beyond a pole's side a patch is turned inside out
         SurfacePoint s = search.s;
         if (within != search.uv)
             s = evaluate(newton, within);
         back = dot(ray.direction, outward(patch, face, cross(s.du, s.dv))) > 0.0f;
     }
-    offer(ray, patch.face, face, leaf, instance, root.t, root.uv, face_uv(patch, kKindBezier, root.uv), back, hit);
+    offer(ray, patch.face, face, leaf, instance, root.t, root.uv, face_uv(patch, kKindBezier, root.uv), back, own, blur,
+          hit);
 }
 
 #include "shaders/stochastic.glsl"
@@ -406,7 +429,7 @@ void bezier_hit(PatchRay ray, PatchRecord patch, FaceRecord face, LeafBox box, f
         if (place == places) {
             if (waiting == 0)
                 break;
-            if (split_count == kMostSplits || (depth == 0 && box_past >= hit.past + ray.slack)) {
+            if (split_count == kMostSplits || (depth == 0 && box_past >= hit.past + as_near(ray, hit))) {
                 doubtful = doubtful || split_count == kMostSplits;
                 break;
             }
@@ -493,7 +516,7 @@ void bezier_hit(PatchRay ray, PatchRecord patch, FaceRecord face, LeafBox box, f
         float off = max(farther(search.uv - middle, half_side), 1.0f);
         bool complete = none || (search.settled && holds_one(bend, off));
         if (search.settled) {
-            offer_end(ray, patch, face, newton, search, leaf, instance, rims, hit);
+            offer_end(ray, patch, face, newton, box, search, leaf, instance, rims, hit);
             doubtful = doubtful || is_blurred(search.uv, root_blur(search.seen, newton.rounding));
         }
         if (!complete && at_end)
@@ -516,7 +539,7 @@ void leaf_hit(uint leaf, uint instance_index, FrameInstance instance, vec2 pixel
     BoxHit in_box = leaf_box_hit(box, ray.origin, ray.direction, margin);
     ++leaf_visits;
     if (!in_box.hit || ray.past + in_box.far < -view.tau_ref - ray.slack ||
-        ray.past + in_box.near > hit.past + ray.slack)
+        ray.past + in_box.near > hit.past + as_near(ray, hit))
         return;
     uint kind = patch.shape & 0xffu;
     FaceRecord face = faces[patch.face];

@@ -27,6 +27,7 @@
 #include "shaders/shared/trim_lookup.h"
 
 #include "shaders/leaf_hit.glsl"
+#include "shaders/last_hits.glsl"
 
 #include "shaders/border_edges.glsl"
 
@@ -116,11 +117,12 @@ void push_children(BvhNode node, TreeRay tree_ray, float tau_max)
 float hit_tau(Hit hit)
 {
     float tau = view.tau_ref + hit.past;
-    return hit.past < kHuge ? tau + 4.0f * kRounding * abs(tau) : kHuge;
+    return hit.past < kHuge ? tau + max(4.0f * kRounding * abs(tau), hit.slack) : kHuge;
 }
 
-// Walks the trees until nothing nearer can wait. Returns false where the driver's loop limit would have cut it short.
-bool walk(vec2 pixel, vec3 across, inout Hit hit)
+// Walks the trees until nothing nearer can wait; the guess is searched before all others, and only then. Returns false
+// where the driver's loop limit would have cut it short.
+bool walk(vec2 pixel, vec3 across, Guess guess, inout Hit hit)
 {
     const uint kNoPart = 0xffffffffu;
     uint part_floor = kNoPart; // what the stack holds below is the top tree's
@@ -129,6 +131,9 @@ bool walk(vec2 pixel, vec3 across, inout Hit hit)
     TreeRay ray = top_ray(across);
     stack_top = 0u;
     push(Waiting(0.0f, 0u));
+    bool guess_waits = has_feature(kFeatureReuse) && guess.leaf != kNoLeaf;
+    if (guess_waits)
+        push(Waiting(0.0f, kBvhLeaf | guess.instance));
     while (stack_top > 0u) {
         iterations = 1u;
         if (part_floor != kNoPart && stack_top == part_floor) {
@@ -152,9 +157,14 @@ bool walk(vec2 pixel, vec3 across, inout Hit hit)
                 instance = instances[index];
                 ray = part_ray(instance, pixel);
                 part_floor = stack_top;
-                push(Waiting(next.tau, 0u));
-            } else
-                leaf_hit(instance.first_leaf + index, instance_index, instance, pixel, hit);
+                push(Waiting(next.tau, guess_waits ? kBvhLeaf | (guess.leaf - instance.first_leaf) : 0u));
+            } else {
+                uint leaf = instance.first_leaf + index;
+                bool is_guess = has_feature(kFeatureReuse) && leaf == guess.leaf && instance_index == guess.instance;
+                if (!is_guess || guess_waits)
+                    leaf_hit(leaf, instance_index, instance, pixel, hit);
+                guess_waits = false;
+            }
         }
         if (iteration_limit > 0u) {
             group_iterations += subgroupMax(iterations);
@@ -275,17 +285,21 @@ void main()
     if (active_here) {
         vec2 pixel = vec2(float(at.x) + 0.5f - view.middle[0], float(at.y + view.first_row) + 0.5f - view.middle[1]);
         vec3 across = pixel.x * vector(view.step_x) + pixel.y * vector(view.step_y);
-        uint kept_pixel = (view.first_row + at.y) * view.width + at.x;
-        Hit before = Hit(kHuge, 0.0f, vec2(0.0f), vec2(0.0f), 0xffffffffu, 0xffffffffu, kHuge, false);
+        uint picture_pixel = (view.first_row + at.y) * view.width + at.x;
+        Hit before = Hit(kHuge, 0.0f, vec2(0.0f), vec2(0.0f), 0xffffffffu, 0xffffffffu, kHuge, false, false, 0.0f);
         if (has_feature(kFeatureKept))
-            before = load_kept(kept_pixel);
+            before = load_kept(picture_pixel);
         if (has_feature(kFeatureStochastic))
             before.doubt = -kHuge; // plain Newton claims nothing
+        Guess guess = Guess(kNoLeaf, 0u);
+        // where the loop limit bears on what is searched, alone, the picture must not hang on the last one
+        if (has_feature(kFeatureReuse) && view.alone == 0u)
+            guess = guess_hit(uvec2(at.x, view.first_row + at.y), pixel);
         Hit hit;
         bool complete;
         for (int attempt = 0; attempt < 2; ++attempt) {
             hit = before;
-            complete = walk(pixel, across, hit);
+            complete = walk(pixel, across, guess, hit);
             if (!complete || !hit.back || rims_cut)
                 break;
             rims_cut = true;
@@ -293,10 +307,12 @@ void main()
         if (has_feature(kFeatureKept)) {
             // a pixel changes only where its new hit is nearer than what was kept
             if (complete && hit.past < before.past)
-                store_kept(kept_pixel, hit);
+                store_kept(picture_pixel, hit);
             else
                 hit = before;
         }
+        if (has_feature(kFeatureReuse))
+            keep_hit(picture_pixel, hit, across);
         FramePixel result = miss_pixel(hit.doubt < kHuge);
         if (hit.past < kHuge)
             result = hit_pixel(hit, pixel, across);

@@ -20,12 +20,14 @@ layout(scalar, set = 0, binding = kBindKdRuns) readonly buffer KdRuns { KdRun kd
 layout(scalar, set = 0, binding = kBindKdPoints) readonly buffer KdPoints { vec2 kd_points[]; };
 layout(scalar, set = 0, binding = kBindKdFaces) readonly buffer KdFaces { KdFace kd_faces[]; };
 layout(scalar, set = 0, binding = kBindKept) buffer KeptHits { KeptHit kept_hits[]; };
+layout(scalar, set = 0, binding = kBindLastHits) readonly buffer LastHits { LastHit last_hits[]; };
+layout(scalar, set = 0, binding = kBindNextHits) writeonly buffer NextHits { LastHit next_hits[]; };
 layout(scalar, push_constant) uniform View { FrameView view; };
 
 // Specialised to what the pack holds and the frame asks for: what is false here costs no instruction.
 layout(constant_id = kSpecTrimMode) const uint trim_mode = 0u;
 layout(constant_id = kSpecKinds) const uint kinds = 0x3fu;
-layout(constant_id = kSpecFeatures) const uint features = 0xffu;
+layout(constant_id = kSpecFeatures) const uint features = 0x1ffu;
 layout(constant_id = kSpecStackSize) const uint stack_size = 290u; // 2 trees of kMaxBvhDepth, 3 waiting children a node
 layout(constant_id = kSpecLocalFloats) const uint local_floats = 1u;
 layout(constant_id = kSpecIterationLimit) const uint iteration_limit = 0u;

@@ -5,7 +5,7 @@ Hit load_kept(uint pixel)
     KeptHit kept = kept_hits[pixel];
     vec2 uv_face = vec2(kept.uv_face[0], kept.uv_face[1]);
     vec2 uv_patch = vec2(kept.uv_patch[0], kept.uv_patch[1]);
-    return Hit(kept.past, kept.t, uv_face, uv_patch, kept.leaf, kept.instance, kHuge, false);
+    return Hit(kept.past, kept.t, uv_face, uv_patch, kept.leaf, kept.instance, kHuge, false, true, 0.0f);
 }
 
 void store_kept(uint pixel, Hit hit)
@@ -34,7 +34,7 @@ void newton_once(PatchRay ray, PatchRecord patch, FaceRecord face, LeafBox box, 
         if (search.settled) {
             search.settled = close;
             search.next.uv = search.uv; // no step more
-            offer_end(ray, patch, face, newton, search, leaf, instance, rims, hit);
+            offer_end(ray, patch, face, newton, box, search, leaf, instance, rims, hit);
             return;
         }
         if (step == kNewtonSteps)

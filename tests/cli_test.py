@@ -583,8 +583,29 @@ class Bench(CliTest):
         self.assertRegex(text, r"(?m)^stochastic +one +1 ")
         self.assertRegex(text, r"Certified frames cost [\d.]+ of")
 
+    def test_moving_measures_pictures_with_and_without_the_last_ones_hits(self):
+        options = ["bench", "moving", PACK, "--size", "48x36", "--frames", 2, "--degrees", 3]
+        if run(*options).returncode == 4:
+            self.skipTest("no Vulkan driver")
+        report = self.json_of(*options, "--json")
+        self.assertEqual((report["width"], report["height"], report["pictures"], report["degrees"]), (48, 36, 2, 3))
+        [measured] = report["packs"]
+        self.assertEqual(measured["differing_pixels"], 0)
+        self.assertGreater(measured["speedup"], 0)
+        for row in [measured["plain"], measured["reusing"]]:
+            self.assertEqual(set(row), {"frame_ms", "node_visits", "leaf_visits", "newton_steps"})
+            self.assertGreater(row["frame_ms"], 0)
+            self.assertGreater(row["leaf_visits"], 0)
+        self.assertNotEqual(measured["plain"]["node_visits"], measured["reusing"]["node_visits"], "nothing was reused")
+        text = self.ok(*options).stdout
+        self.assertRegex(text, r"times as fast with reuse; 0 pixels differ")
+        self.assertRegex(text, r"(?m)^last hits +[\d.]+ ")
+
     def test_errors_have_their_exit_codes(self):
         self.fails(1, "bench", says=["bench", "subcommand"])
+        self.fails(1, "bench", "moving", PACK, "--frames", "0", says=["--frames"])
+        self.fails(1, "bench", "moving", PACK, "--device", "gpu", says=["--device", "vulkan"])
+        self.fails(4, "bench", "moving", PACK, "--device", "cpu", "--size", "32x24", says=["reuses nothing", "--device vulkan"])
         self.fails(1, "bench", "closest", says=["bench closest", "PACK"])
         self.fails(1, "bench", "closest", PACK, "--frames", "0", says=["--frames"])
         self.fails(1, "bench", "closest", PACK, "--views", "frnt", says=["--views", "frnt"])
