@@ -329,7 +329,7 @@ int run_bench_moving(MovingArguments arguments)
         print_json({{"device", device},
                     {"width", size->width},
                     {"height", size->height},
-                    {"pictures", options.pictures},
+                    {"frames", options.pictures},
                     {"degrees", options.degrees},
                     {"packs", packs}});
     return kExitOk;

@@ -171,7 +171,7 @@ bool inside_face(uint face_id, FaceRecord face, vec2 uv, bool beside_rim)
     return true;
 }
 
-// A hit of the ray's patch this much nearer or farther than the nearest so far is as near: the same whichever came first
+// Hits of the ray's patch count as equally near as the nearest so far within this: the same whichever comes first
 float as_near(PatchRay ray, Hit hit)
 {
     return max(ray.slack, hit.slack);

@@ -588,7 +588,7 @@ class Bench(CliTest):
         if run(*options).returncode == 4:
             self.skipTest("no Vulkan driver")
         report = self.json_of(*options, "--json")
-        self.assertEqual((report["width"], report["height"], report["pictures"], report["degrees"]), (48, 36, 2, 3))
+        self.assertEqual((report["width"], report["height"], report["frames"], report["degrees"]), (48, 36, 2, 3))
         [measured] = report["packs"]
         self.assertEqual(measured["differing_pixels"], 0)
         self.assertGreater(measured["speedup"], 0)

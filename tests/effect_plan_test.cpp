@@ -96,6 +96,15 @@ TEST(effect_plan, names_the_trims_as_they_are_asked_for)
     }
 }
 
+TEST(effect_plan, names_reused_hits_where_they_are_asked_for_and_can_be)
+{
+    RenderOptions options;
+    options.reuse_last = true;
+    EXPECT_THAT(names(bare_plane(), options), testing::ElementsAre("plane", "reused-hits", "shading"));
+    options.closest = ClosestPolicy::Stochastic;
+    EXPECT_THAT(names(bare_plane(), options), testing::ElementsAre("plane", "stochastic-starts", "shading"));
+}
+
 TEST(faces_by_kind, counts_each_face_once)
 {
     PackImage image = bare_plane();
