@@ -304,14 +304,14 @@ private:
         const RayBend bend = middle_bend(leaf, seen);
         const mask grazing = !holds_one(bend, real(1.0f));
         if (any_lane(moving && grazing))
-            moving = moving && !(grazing && passes_by(leaf, planes, middle, seen, 1.0f, newton.rounding));
-        const mask straight = moving && !grazing;
-        mask open = moving && grazing, doubtful(false);
-        if (any_lane(straight)) {
-            const Rectangle whole{real2(leaf.middle), leaf.half_side, bend};
-            const Search search = find_root(newton, leaf, whole, planes, middle, seen, straight, work_.newton_steps);
-            open = open || (straight && !search.complete);
-            doubtful = straight && search.blurred;
+            moving = moving && !(grazing && passes_by(leaf, planes, middle, seen, real(1.0f), newton.rounding));
+        const mask searched = moving && bend.bend + bend.noise < kLargestSearched;
+        mask open = moving && !searched, doubtful(false);
+        if (any_lane(searched)) {
+            const Rectangle whole{real2(leaf.middle), real2(leaf.half_side), real(1.0f), bend, mask(false)};
+            const Search search = find_root(newton, leaf, whole, planes, middle, seen, searched, work_.newton_steps);
+            open = open || (searched && !search.complete);
+            doubtful = searched && search.blurred;
             const Root root = end_of(newton, search, origin, direction);
             const mask near = root.found && in_range(target, root.t, hit);
             if (any_lane(near))
@@ -383,24 +383,10 @@ private:
     HWY_ATTR HWY_NOINLINE mask split(Target& target, const NewtonPatch& newton, const LeafPlane& leaf,
                                      const RayPlanes& planes, mask open, real3 origin, real3 direction, PacketHit& hit)
     {
-        alignas(64) float rays[14][kLanes];
-        const real* const values[14] = {&origin.x,    &origin.y,    &origin.z,    &direction.x, &direction.y,
-                                        &direction.z, &planes.n1.x, &planes.n1.y, &planes.n1.z, &planes.d1,
-                                        &planes.n2.x, &planes.n2.y, &planes.n2.z, &planes.d2};
-        for (int i = 0; i < 14; ++i)
-            store(*values[i], rays[i]);
         RootLists roots;
-        uint doubtful = 0;
-        int most = 0;
-        for (uint bits = lane_bits(open); bits != 0; bits &= bits - 1) {
-            const int lane = __builtin_ctz(bits);
-            const auto all = [&](int i) HWY_ATTR { return real(rays[i][lane]); };
-            const RayPlanes ray{real3(all(6), all(7), all(8)), all(9), real3(all(10), all(11), all(12)), all(13)};
-            if (!list_roots(newton, leaf, ray, real3(all(0), all(1), all(2)), real3(all(3), all(4), all(5)), lane,
-                            roots, work_.newton_steps))
-                doubtful |= 1u << lane;
-            most = std::max(most, roots.count[lane]);
-        }
+        const PacketRays rays = packet_rays(origin, direction, planes);
+        const uint doubtful = list_roots(newton, leaf, rays, lane_bits(open), roots, work_.newton_steps);
+        const int most = *std::max_element(roots.count, roots.count + kLanes);
         for (int i = 0; i < most; ++i) {
             uint has = 0;
             for (int lane = 0; lane < kLanes; ++lane)

@@ -10,8 +10,8 @@ const uint kTorusIterations = 3u * 24u + 4u * 32u; // bound of torus_roots
 const uint kRoundIterations = 20000u;
 bool overrun = false; // a leaf took more
 
-const uint kPartsWork = 64u; // evaluations that the 16 parts of a leaf take, about
-uint group_iterations = 0u;  // of the whole subgroup, whose lanes share the driver's limit
+const uint kQuartersWork = 32u; // evaluations that the quarters of a part take, about
+uint group_iterations = 0u;      // of the whole subgroup, whose lanes share the driver's limit
 
 // Where loops are limited, what a leaf's splitting may take: a sixth of what is left of three quarters of the limit, for
 // leaves behind must be searched too
@@ -339,12 +339,6 @@ struct Search {
     vec2 uv;
 };
 
-// The larger of |d| in half sides
-float farther(vec2 d, vec2 half_side)
-{
-    return max(abs(d.x) / half_side.x, abs(d.y) / half_side.y);
-}
-
 // What a search ended at; accepted anywhere on the patch, so that leaves leave no gaps
 void offer_end(PatchRay ray, PatchRecord patch, FaceRecord face, NewtonPatch newton, LeafBox box, Search search,
                uint leaf, uint instance, bool rims, inout Hit hit)
@@ -376,19 +370,30 @@ void offer_end(PatchRay ray, PatchRecord patch, FaceRecord face, NewtonPatch new
 
 #include "shaders/stochastic.glsl"
 
-// Parts of a leaf are numbered by their places in the parts before: 4 bits a depth, below them the depth
-const uint kDepthBits = 2u;
+// Parts of a leaf are numbered by the quarters that they lie in, 2 bits a depth, below them the depth
+const uint kDepthBits = 3u;
+
+uint part_depth(uint part)
+{
+    return part & 7u;
+}
 
 vec2 part_middle(LeafBox box, uint part)
 {
     vec2 middle = leaf_middle(box);
-    int depth = int(part & 3u);
-    for (int i = 1; i <= depth; ++i) {
-        uint place = part >> (kDepthBits + 4u * uint(depth - i));
-        vec2 off = 2.0f * vec2(float(place & 3u), float(place >> 2u & 3u)) - 3.0f;
-        middle += split_share(i) * leaf_half_side(box) * off;
+    vec2 half_side = leaf_half_side(box);
+    uint depth = part_depth(part);
+    for (uint i = 1u; i <= depth; ++i) {
+        uint quarter = part >> (kDepthBits + 2u * (depth - i));
+        half_side *= 0.5f;
+        middle += half_side * (2.0f * vec2(float(quarter & 1u), float(quarter >> 1u & 1u)) - 1.0f);
     }
     return middle;
+}
+
+uint quarter_of(uint part, uint quarter)
+{
+    return (part >> kDepthBits << 2u | quarter) << kDepthBits | (part_depth(part) + 1u);
 }
 
 // All roots in the leaf: of the whole of it, where its bend allows a proof that they are all, else of its parts. One
@@ -416,94 +421,76 @@ void bezier_hit(PatchRay ray, PatchRecord patch, FaceRecord face, LeafBox box, f
     vec2 lost = derivative_loss(box, vec2(patch.param[0], patch.param[1]), newton.degree_u, newton.degree_v);
     uint search_work = uint(kNewtonSteps + 2) * newton.work;
     LeafPlane plane;
-    uint stack[16 * kDeepestSplit];
-    int waiting = 0;
-    int split_count = 0;
-    uint part = 0u; // whose children are at hand
-    uint place = 0u;
-    uint places = 1u;
-    int depth = 0; // of the children; 0: the leaf itself
-    float share = 1.0f;
+    uint stack[3 * kDeepestSplit + 1];
+    stack[0] = 0u; // the whole leaf
+    int waiting = 1;
+    int part_count = 0;
+    bool spent = false; // too many parts stay open: 16 that are not split stand for the leaf
     bool doubtful = false;
-    for (;; ++place) {
-        if (place == places) {
-            if (waiting == 0)
+    while (waiting > 0) {
+        uint part = stack[--waiting];
+        uint depth = part_depth(part);
+        bool at_end = depth == uint(kDeepestSplit) || spent;
+        if (iteration_limit > 0u && depth > 0u) {
+            at_end = at_end || iterations + kQuartersWork * newton.work > split_iterations();
+            if (iterations + search_work > 2u * split_iterations()) {
+                doubtful = true;
                 break;
-            if (split_count == kMostSplits || (depth == 0 && box_past >= hit.past + as_near(ray, hit))) {
-                doubtful = doubtful || split_count == kMostSplits;
-                break;
-            }
-            if (iteration_limit > 0u && view.alone == 0u) {
-                overrun = true; // lanes would split at different places, and their loops add up: alone, then
-                return;
-            }
-            ++split_count;
-            part = stack[--waiting];
-            depth = int(part & 3u) + 1;
-            share = split_share(depth);
-            place = 0u;
-            places = 16u;
-            if (iteration_limit > 0u && depth == 1 && iterations + kPartsWork * newton.work > split_iterations()) {
-                doubtful = true; // not enough for the parts, which its four quarters stand for
-                share = 0.5f;
-                places = 4u;
             }
         }
-        if (iteration_limit > 0u && depth > 0 &&
-            iterations + search_work > (depth == 1 ? 2u : 1u) * split_iterations()) {
-            doubtful = true;
-            break;
-        }
-        iterations += 1u + uint(depth);
-        uint child = depth == 0 ? 0u : ((part >> kDepthBits << 4u | place) << kDepthBits) | uint(depth);
+        iterations += 1u + depth;
+        float share = 1.0f / float(1u << depth);
         vec2 half_side = share * leaf_half_side(box);
-        vec2 middle = part_middle(box, child);
-        if (places == 4u)
-            middle = leaf_middle(box) + half_side * (2.0f * vec2(float(place & 1u), float(place >> 1u)) - 1.0f);
+        vec2 per_side = 1.0f / half_side;
+        vec2 middle = part_middle(box, part);
         Search search;
         search.settled = false;
         search.exact = false;
         search.uv = middle;
         RootBox where = RootBox(middle - half_side, middle + half_side);
         RayBend bend;
+        bool one = false;  // the rectangle holds one root at most
         bool none = false; // proved: there is no root in the rectangle
         bool near = false;
-        bool at_end = depth == kDeepestSplit || places == 4u;
         for (int step = 0;; ++step) {
             vec2 uv = search.uv;
             search.s = evaluate(newton, uv);
-            if (step == 0 && depth == 0)
+            if (step == 0 && depth == 0u)
                 plane = leaf_plane(box, search.s.p, search.s.du, search.s.dv, lost);
             search.seen = seen_point(search.s, newton.planes);
+            RayBend around;
+            if (step == 0 && depth == 0u) {
+                bend = middle_bend(plane, search.seen);
+                around = bend;
+            } else if (step == 0 || !one)
+                around = bend_around(plane, newton.planes, search.seen, share);
             if (step == 0) {
-                if (depth == 0)
-                    bend = middle_bend(plane, search.seen);
-                else
-                    bend = bend_around(plane, newton.planes, search.seen, share);
-                bool one = holds_one(bend, 1.0f);
-                if (depth > 0)
+                bend = around;
+                one = holds_one(bend, 1.0f);
+                if (depth > 0u) {
                     ++newton_steps;
-                if (depth > 0 || !one)
+                    at_end = at_end || bends_as_ever(plane, search.s, share);
+                }
+                if (depth > 0u || !one)
                     none = passes_by(plane, newton.planes, search.s, search.seen, share, newton.rounding);
-                at_end = at_end || (depth > 0 && bends_as_ever(plane, search.s, share));
-                if (none || !(one || at_end || depth == 1))
+                if (none || !(at_end || bend.bend + bend.noise < kLargestSearched))
                     break;
             }
             NewtonStep next = newton_step(search.seen, uv);
             search.next = next;
-            RayBend from = bend_from(bend, farther(uv - middle, half_side));
+            float from = one ? bend_from(bend, farther(uv - middle, per_side)).bend : around.bend;
             vec2 moved = next.uv - uv;
-            float turn = from.bend * farther(moved, half_side);
+            float turn = from * farther(moved, per_side);
             search.exact = newton_exact(plane, search.s, next, moved, turn, newton.rounding, newton.enough);
             search.settled = search.exact || newton_settled(next, turn, near, newton.rounding);
             near = next.residual <= newton.rounding + next.blur;
             if (search.settled)
                 break;
-            if (!next.singular) {
-                where = narrowed(where, plane, search.seen, uv, next.uv, from.bend, half_side, newton.rounding);
+            if (!next.singular && farther(next.uv - middle, per_side) > 1.0f) {
+                where = narrowed(where, plane, search.seen, uv, next.uv, from, per_side, newton.rounding);
                 none = is_empty(where);
             }
-            if (none || step == kNewtonSteps)
+            if (none || step == (one || at_end ? kNewtonSteps : kGrazingSteps))
                 break;
             ++newton_steps;
             vec2 to =
@@ -512,17 +499,38 @@ void bezier_hit(PatchRay ray, PatchRecord patch, FaceRecord face, LeafBox box, f
                 break;
             search.uv = to;
         }
-        // one root at most in a rectangle as large as to hold it
-        float off = max(farther(search.uv - middle, half_side), 1.0f);
-        bool complete = none || (search.settled && holds_one(bend, off));
+        bool complete = none;
         if (search.settled) {
+            // one root at most in a rectangle as large as to hold it
+            complete = holds_one(bend, max(farther(search.uv - middle, per_side), 1.0f));
+            if (!complete) {
+                RayBend around = bend_around(plane, newton.planes, search.seen, share);
+                complete = is_only_root(where, search.uv, around, per_side);
+            }
             offer_end(ray, patch, face, newton, box, search, leaf, instance, rims, hit);
             doubtful = doubtful || is_blurred(search.uv, root_blur(search.seen, newton.rounding));
         }
-        if (!complete && at_end)
+        if (complete || (depth == 0u && box_past >= hit.past + as_near(ray, hit)))
+            continue;
+        if (iteration_limit > 0u && view.alone == 0u) {
+            overrun = true; // lanes would split at different places, and their loops add up: alone, then
+            return;
+        }
+        if (at_end) {
             doubtful = true;
-        else if (!complete)
-            stack[waiting++] = child;
+            continue;
+        }
+        part_count += 4;
+        if (part_count > kMostParts) {
+            spent = true;
+            doubtful = true;
+            waiting = 0;
+            for (uint sixteenth = 0u; sixteenth < 16u; ++sixteenth)
+                stack[waiting++] = quarter_of(quarter_of(0u, sixteenth >> 2u), sixteenth & 3u);
+            continue;
+        }
+        for (uint quarter = 0u; quarter < 4u; ++quarter)
+            stack[waiting++] = quarter_of(part, quarter);
     }
     if (doubtful)
         hit.doubt = min(hit.doubt, min(box_past, hit.past)); // it may lie a little before its box, on the next leaf

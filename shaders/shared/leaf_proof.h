@@ -88,14 +88,13 @@ FN LeafPlane leaf_plane(LeafBox box, scalar3 p, scalar3 du, scalar3 dv, scalar2 
     return leaf;
 }
 
-// A leaf that leaves something open is split, 4 x 4 parts at a time, so often, and parts of parts so many times
-const int kDeepestSplit = 3;
-const int kMostSplits = 24;
-
-FN scalar split_share(int depth)
-{
-    return depth == 1 ? 0.25f : (depth == 2 ? 0.0625f : 0.015625f);
-}
+// A leaf that leaves something open is split into its quarters, those of its parts that do as well, so often and for a
+// ray into so many parts
+const int kDeepestSplit = 6;
+const int kMostParts = 384;
+// From this bend of a rectangle on the search for its root waits until it is split: most would leave it open
+const scalar kLargestSearched = 1.5f;
+const int kGrazingSteps = 2;
 
 // Of a rectangle as a ray sees it around a point
 struct RayBend {
@@ -126,7 +125,7 @@ FN real3 on_plane(LeafPlane leaf, RayPlanes ray, SeenPoint seen, scalar3 y)
 }
 
 // The ray's bend of a rectangle `share` times the leaf's size, around any point of the leaf
-FN RayBend bend_around(LeafPlane leaf, RayPlanes ray, SeenPoint seen, scalar share)
+FN RayBend bend_around(LeafPlane leaf, RayPlanes ray, SeenPoint seen, real share)
 {
     // R (P DS_c)^-1 P [Q n]: of two orthogonal axes of the leaf's plane, and of its normal
     real3 a = on_plane(leaf, ray, seen, leaf.axis);
@@ -148,10 +147,11 @@ FN RayBend bend_around(LeafPlane leaf, RayPlanes ray, SeenPoint seen, scalar sha
 
 // True where a rectangle `share` times the leaf's size, whose middle is `s`, bends too much for any ray's proof, and
 // for its size no less than half as much as the leaf: beside a pole, where a derivative vanishes, none is small enough.
-FN mask bends_as_ever(LeafPlane leaf, SurfacePoint s, scalar share)
+FN mask bends_as_ever(LeafPlane leaf, SurfacePoint s, real share)
 {
-    scalar less = share * min(leaf.along, 2.0f);
-    return dot(s.du, s.du) <= less * less * leaf.uu || dot(s.dv, s.dv) <= less * less * leaf.vv;
+    real less = share * min(leaf.along, 2.0f);
+    mask is_short = dot(s.du, s.du) <= less * less * leaf.uu || dot(s.dv, s.dv) <= less * less * leaf.vv;
+    return is_short && share < 0.5f; // of half a leaf it tells nothing
 }
 
 // True where a rectangle `off` times as large holds one root at most
@@ -162,7 +162,7 @@ FN mask holds_one(RayBend ray, real off)
 
 // True where all points of a rectangle `share` times the leaf's size around the point `seen` lie on one side of the ray
 // along the picture's direction (m1, m2), a unit vector
-FN mask lies_aside(LeafPlane leaf, RayPlanes ray, SeenPoint seen, real m1, real m2, scalar share, scalar rounding)
+FN mask lies_aside(LeafPlane leaf, RayPlanes ray, SeenPoint seen, real m1, real m2, real share, scalar rounding)
 {
     real off = abs(m1 * seen.r.x + m2 * seen.r.y);
     real slope = abs(m1 * seen.du.x + m2 * seen.du.y) * (share * leaf.half_side.x) +
@@ -170,14 +170,14 @@ FN mask lies_aside(LeafPlane leaf, RayPlanes ray, SeenPoint seen, real m1, real 
     real up = abs(dot(ray.n1 * m1 + ray.n2 * m2, real3(leaf.normal)));
     real level = sqrt(max(1.0f - up * up, real(0.0f)));
     real bend = (0.5f * share * share * leaf.size) * (leaf.along * level + leaf.across * up);
-    scalar lost = share * (leaf.lost.x * leaf.half_side.x + leaf.lost.y * leaf.half_side.y);
+    real lost = share * (leaf.lost.x * leaf.half_side.x + leaf.lost.y * leaf.half_side.y);
     // twice: for the point, and for a root that a patch's overlap lets in
     return off > slope + bend + lost + 4.0f * rounding;
 }
 
 // True where the ray passes by the rectangle, whatever its slope: along the surface's normal `s.du` x `s.dv` as the ray
 // sees it, where a rectangle that it grazes is thin, or across it
-FN mask passes_by(LeafPlane leaf, RayPlanes ray, SurfacePoint s, SeenPoint seen, scalar share, scalar rounding)
+FN mask passes_by(LeafPlane leaf, RayPlanes ray, SurfacePoint s, SeenPoint seen, real share, scalar rounding)
 {
     real3 n = cross(s.du, s.dv);
     real n1 = dot(ray.n1, n);
@@ -242,15 +242,21 @@ FN mask is_empty(RootBox box)
     return box.hi.x < box.lo.x || box.hi.y < box.lo.y;
 }
 
+// The larger of |d|, in half sides of a rectangle that are 1 / per_side
+FN real farther(real2 d, real2 per_side)
+{
+    return max(abs(d.x) * per_side.x, abs(d.y) * per_side.y);
+}
+
 // `box` cut to where a root may lie after a step from `uv`, `seen` there, to `to`; `bend` around uv of a rectangle with
-// these half sides; `rounding`: of a point.
-FN RootBox narrowed(RootBox box, LeafPlane leaf, SeenPoint seen, real2 uv, real2 to, real bend, scalar2 half_side,
+// half sides 1 / per_side; `rounding`: of a point.
+FN RootBox narrowed(RootBox box, LeafPlane leaf, SeenPoint seen, real2 uv, real2 to, real bend, real2 per_side,
                     scalar rounding)
 {
     // from uv to the farthest point of the box
     real off_u = max(uv.x - box.lo.x, box.hi.x - uv.x);
     real off_v = max(uv.y - box.lo.y, box.hi.y - uv.y);
-    real far = max(off_u * (1.0f / half_side.x), off_v * (1.0f / half_side.y));
+    real far = farther(real2(off_u, off_v), per_side);
     real way = sqrt(leaf.uu * off_u * off_u + 2.0f * leaf.uv * off_u * off_v + leaf.vv * off_v * off_v);
     // on the leaf's plane; beyond every proof a root may lie anywhere
     real reach = select(bend < kMostBend, 0.5f * bend * far * way, real(kHuge));
@@ -260,6 +266,15 @@ FN RootBox narrowed(RootBox box, LeafPlane leaf, SeenPoint seen, real2 uv, real2
     less.lo = real2(max(box.lo.x, to.x - off.x), max(box.lo.y, to.y - off.y));
     less.hi = real2(min(box.hi.x, to.x + off.x), min(box.hi.y, to.y + off.y));
     return less;
+}
+
+// True where `uv` is the box's only root; `around`: the bend around it of a rectangle with half sides 1 / per_side. On
+// the way to another one DS would have to turn by 1 in the mean, and turns evenly.
+FN mask is_only_root(RootBox box, real2 uv, RayBend around, real2 per_side)
+{
+    real off_u = max(uv.x - box.lo.x, box.hi.x - uv.x);
+    real off_v = max(uv.y - box.lo.y, box.hi.y - uv.y);
+    return holds_one(around, 0.5f * farther(real2(off_u, off_v), per_side));
 }
 
 SHARED_CLOSE

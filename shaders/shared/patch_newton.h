@@ -102,9 +102,9 @@ FN NewtonStep newton_step(SeenPoint s, real2 uv)
     return next;
 }
 
-FN real kept_near(real u, real middle, scalar half_side)
+FN real kept_near(real u, real middle, real half_side)
 {
-    scalar reach = kNewtonReach * half_side;
+    real reach = kNewtonReach * half_side;
     return clamp(u, max(middle - reach, real(-kNewtonOutside)), min(middle + reach, real(1.0f + kNewtonOutside)));
 }
 
