@@ -10,7 +10,7 @@ const uint kTorusIterations = 3u * 24u + 4u * 32u; // bound of torus_roots
 const uint kRoundIterations = 20000u;
 bool overrun = false; // a leaf took more
 
-const uint kQuartersWork = 32u; // evaluations that the quarters of a part take, about
+const uint kQuartersWork = 64u; // evaluations that the quarters of a part take, and theirs, about
 uint group_iterations = 0u;      // of the whole subgroup, whose lanes share the driver's limit
 
 // Where loops are limited, what a leaf's splitting may take: a sixth of what is left of three quarters of the limit, for
@@ -529,8 +529,8 @@ void bezier_hit(PatchRay ray, PatchRecord patch, FaceRecord face, LeafBox box, f
                 stack[waiting++] = quarter_of(quarter_of(0u, sixteenth >> 2u), sixteenth & 3u);
             continue;
         }
-        for (uint quarter = 0u; quarter < 4u; ++quarter)
-            stack[waiting++] = quarter_of(part, quarter);
+        for (uint quarter = 4u; quarter > 0u; --quarter)
+            stack[waiting++] = quarter_of(part, quarter - 1u);
     }
     if (doubtful)
         hit.doubt = min(hit.doubt, min(box_past, hit.past)); // it may lie a little before its box, on the next leaf

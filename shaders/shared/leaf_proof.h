@@ -7,7 +7,8 @@
 // rectangle's half sides. Then, d being Newton's step from c,
 // - a root x of the rectangle lies within k / 2 |R (x - c)| of c + d;
 // - if k < 1 there is one root at most;
-// - if k |d| <= 1/2, |d| in half sides, there is a root within k |d| |R d| of c + d.
+// - if k |d| <= 1/2, |d| in half sides, there is a root within k |d| |R d| of c + d;
+// - if c is a root and the whole rectangle lies within l half sides of it, k l / 2 < 1, it has no other.
 // What single precision loses of DS_c, E, adds its noise to that, a bound e of |(P DS_c)^-1 P E| whatever the
 // rectangle's size: to k for the one root; and the length of E (x - c) to what rounding may have moved c + d.
 // Source: Krawczyk 1969; Kantorovich's theorem (Ortega & Rheinboldt 12.6); the contraction mapping theorem (5.1).
@@ -92,7 +93,8 @@ FN LeafPlane leaf_plane(LeafBox box, scalar3 p, scalar3 du, scalar3 dv, scalar2 
 // ray into so many parts
 const int kDeepestSplit = 6;
 const int kMostParts = 384;
-// From this bend of a rectangle on the search for its root waits until it is split: most would leave it open
+// A rectangle that bends more is split without a search, which would mostly leave it open; one with more than one root's
+// bend is given so many steps
 const scalar kLargestSearched = 1.5f;
 const int kGrazingSteps = 2;
 
