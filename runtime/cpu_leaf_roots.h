@@ -1,5 +1,5 @@
-// The roots of rays in a leaf of a Bezier patch, 16 at once: of 16 rays in the whole leaf, or of any of them in 16 parts
-// of it. Included once per target by cpu_packet.h.
+// The roots of rays in a leaf of a Bezier patch, 16 at once: of 16 rays in the whole leaf, or of any of them in 16
+// parts of it. Included once per target by cpu_packet.h.
 #if defined(TRIMRAY_CPU_LEAF_ROOTS_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef TRIMRAY_CPU_LEAF_ROOTS_H
 #undef TRIMRAY_CPU_LEAF_ROOTS_H

@@ -93,8 +93,8 @@ FN LeafPlane leaf_plane(LeafBox box, scalar3 p, scalar3 du, scalar3 dv, scalar2 
 // ray into so many parts
 const int kDeepestSplit = 6;
 const int kMostParts = 384;
-// A rectangle that bends more is split without a search, which would mostly leave it open; one with more than one root's
-// bend is given so many steps
+// A rectangle that bends more is split without a search, which would mostly leave it open; one that may hold several
+// roots and is split after it is given so many steps
 const scalar kLargestSearched = 1.5f;
 const int kGrazingSteps = 2;
 
