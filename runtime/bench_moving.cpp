@@ -62,10 +62,7 @@ struct Pictures {
     void add(const RenderStats& stats)
     {
         ms.push_back(stats.frame_ms.back());
-        work.rays += stats.work.rays;
-        work.node_visits += stats.work.node_visits;
-        work.leaf_visits += stats.work.leaf_visits;
-        work.newton_steps += stats.work.newton_steps;
+        work += stats.work;
     }
     MovingFigures figures() const
     {

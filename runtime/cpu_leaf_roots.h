@@ -307,10 +307,9 @@ FN_LARGE uint list_roots(const NewtonPatch& newton, const LeafPlane& leaf, const
         steps += uint64_t(__builtin_popcount(part.lanes));
         rectangle.bend = bend_around(leaf, planes, seen, rectangle.share);
         mask unknown = taken && !passes_by(leaf, planes, s, seen, rectangle.share, newton.rounding);
-        const mask at_end = lanes_of(whole) || bends_as_ever(leaf, s, rectangle.share) ||
-                            (rectangle.bend.noise >= kOneRoot && rectangle.share <= 0.125f);
+        const mask at_end = lanes_of(whole) || splits_in_vain(leaf, s, rectangle.bend, rectangle.share);
         rectangle.last = at_end;
-        const mask searched = unknown && (rectangle.bend.bend + rectangle.bend.noise < kLargestSearched || at_end);
+        const mask searched = unknown && (is_searched(rectangle.bend) || at_end);
         mask doubt(false);
         if (any_lane(searched)) {
             const Search search = find_root(newton, leaf, rectangle, planes, s, seen, searched, steps);

@@ -305,7 +305,7 @@ private:
         const mask grazing = !holds_one(bend, real(1.0f));
         if (any_lane(moving && grazing))
             moving = moving && !(grazing && passes_by(leaf, planes, middle, seen, real(1.0f), newton.rounding));
-        const mask searched = moving && bend.bend + bend.noise < kLargestSearched;
+        const mask searched = moving && is_searched(bend);
         mask open = moving && !searched, doubtful(false);
         if (any_lane(searched)) {
             const Rectangle whole{real2(leaf.middle), real2(leaf.half_side), real(1.0f), bend, mask(false)};

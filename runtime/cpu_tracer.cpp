@@ -24,17 +24,6 @@
 namespace trimray {
 namespace {
 
-void add(WorkCounts& sum, const WorkCounts& part)
-{
-    sum.rays += part.rays;
-    sum.node_visits += part.node_visits;
-    sum.leaf_visits += part.leaf_visits;
-    sum.newton_steps += part.newton_steps;
-    sum.curve_tests += part.curve_tests;
-    sum.uncertified_pixels += part.uncertified_pixels;
-    sum.edge_tests += part.edge_tests;
-}
-
 class CpuTracer final : public Tracer {
 public:
     CpuTracer(std::shared_ptr<const Scene> scene, TraceBlock trace_block, const std::string& instruction_set)
@@ -141,7 +130,7 @@ private:
             draw_effects(scene_->pack.image, options, run_each, edge_map_, frame);
         WorkCounts sum;
         for (const WorkCounts& some : counts)
-            add(sum, some);
+            sum += some;
         return sum;
     }
 

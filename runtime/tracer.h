@@ -106,6 +106,18 @@ struct Frame {
 struct WorkCounts {
     uint64_t rays = 0, node_visits = 0, leaf_visits = 0, newton_steps = 0, curve_tests = 0, uncertified_pixels = 0;
     uint64_t edge_tests = 0; // pieces of borders measured, a ray each
+
+    WorkCounts& operator+=(const WorkCounts& other)
+    {
+        rays += other.rays;
+        node_visits += other.node_visits;
+        leaf_visits += other.leaf_visits;
+        newton_steps += other.newton_steps;
+        curve_tests += other.curve_tests;
+        uncertified_pixels += other.uncertified_pixels;
+        edge_tests += other.edge_tests;
+        return *this;
+    }
 };
 
 struct RenderStats {

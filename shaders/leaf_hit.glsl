@@ -469,11 +469,11 @@ void bezier_hit(PatchRay ray, PatchRecord patch, FaceRecord face, LeafBox box, f
                 one = holds_one(bend, 1.0f);
                 if (depth > 0u) {
                     ++newton_steps;
-                    at_end = at_end || bends_as_ever(plane, search.s, share);
+                    at_end = at_end || splits_in_vain(plane, search.s, bend, share);
                 }
                 if (depth > 0u || !one)
                     none = passes_by(plane, newton.planes, search.s, search.seen, share, newton.rounding);
-                if (none || !(at_end || bend.bend + bend.noise < kLargestSearched))
+                if (none || !(at_end || is_searched(bend)))
                     break;
             }
             NewtonStep next = newton_step(search.seen, uv);

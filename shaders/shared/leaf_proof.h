@@ -149,11 +149,20 @@ FN RayBend bend_around(LeafPlane leaf, RayPlanes ray, SeenPoint seen, real share
 
 // True where a rectangle `share` times the leaf's size, whose middle is `s`, bends too much for any ray's proof, and
 // for its size no less than half as much as the leaf: beside a pole, where a derivative vanishes, none is small enough.
-FN mask bends_as_ever(LeafPlane leaf, SurfacePoint s, real share)
+// And where rounding, which splitting does not lessen, hides all from this ray: small parts still tell that it passes
+// by.
+FN mask splits_in_vain(LeafPlane leaf, SurfacePoint s, RayBend ray, real share)
 {
     real less = share * min(leaf.along, 2.0f);
     mask is_short = dot(s.du, s.du) <= less * less * leaf.uu || dot(s.dv, s.dv) <= less * less * leaf.vv;
-    return is_short && share < 0.5f; // of half a leaf it tells nothing
+    // of half a leaf the first tells nothing
+    return (is_short && share < 0.5f) || (ray.noise >= kOneRoot && share <= 0.125f);
+}
+
+// True where a rectangle is searched before it is split
+FN mask is_searched(RayBend ray)
+{
+    return ray.bend + ray.noise < kLargestSearched;
 }
 
 // True where a rectangle `off` times as large holds one root at most
