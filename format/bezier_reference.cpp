@@ -478,7 +478,7 @@ BezierReference::BezierReference(const PatchRecord& patch, const float* control_
                                  double overlap_v)
     : degree_{static_cast<int>(patch.shape >> 8 & 0xffu), static_cast<int>(patch.shape >> 16 & 0xffu)}
 {
-    assert(overlap_u >= 0 && overlap_u <= kMostOverlap && overlap_v >= 0 && overlap_v <= kMostOverlap);
+    assert(overlap_u >= 0 && overlap_u <= kMostPatchSlack && overlap_v >= 0 && overlap_v <= kMostPatchSlack);
     const bool rational = (patch.shape & kShapeRational) != 0;
     const size_t count = static_cast<size_t>(degree_[0] + 1) * static_cast<size_t>(degree_[1] + 1);
     const float* c = control_points + patch.first_control_point;

@@ -30,7 +30,7 @@ struct SearchEnd {
 class BezierReference {
 public:
     /// The patch over [-overlap, 1 + overlap] of uv_patch; over [0, 1] along both where a weight would not be positive
-    /// beyond. Domain: a validated record of kind Bezier; 0 <= overlap_u, overlap_v <= kMostOverlap.
+    /// beyond. Domain: a validated record of kind Bezier; 0 <= overlap_u, overlap_v <= kMostPatchSlack.
     BezierReference(const PatchRecord& patch, const float* control_points, double overlap_u, double overlap_v);
 
     /// Calls take(root) for each root with t in [t_lo, t_hi]. A root between two parts may come twice. A contact stands
@@ -46,8 +46,6 @@ public:
 
     /// Of the control points, patch units.
     Bounds bounds() const;
-
-    static constexpr double kMostOverlap = 1e-3;
 
 private:
     // w x, w y, w z, w

@@ -114,8 +114,8 @@ ClosestReference::ClosestReference(const PackImage& image)
             if (kind_of(patch) == kKindBezier) {
                 double overlap[2];
                 for (size_t k = 0; k < 2; ++k)
-                    overlap[k] = std::min(double(kDomainSlack) / std::abs(double(patch.uv_scale[k])),
-                                          reference::BezierReference::kMostOverlap);
+                    overlap[k] =
+                        std::min(double(kDomainSlack) / std::abs(double(patch.uv_scale[k])), double(kMostPatchSlack));
                 beziers_[i].emplace(patch, image.control_points.data(), overlap[0], overlap[1]);
                 boxes.push_back(part_bounds(patch, beziers_[i]->bounds()));
                 continue;

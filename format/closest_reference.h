@@ -4,12 +4,11 @@
 //
 // What counts as a hit: a point of a face's surface at t > 0 whose uv_face lies in [-kDomainSlack, 1 + kDomainSlack]^2,
 // as SPEC.md states, and inside the face's loops once it is moved to the nearest point of [0, kUvBelowOne]^2. A Bezier
-// patch goes on as its polynomials do beyond each of its sides by kDomainSlack in uv_face (at most 0.01 of the patch),
-// so that neighbouring patches, whose control points are rounded each in its own frame, leave no crack. The backs of
-// rims are no surface for rays that begin outside of the part's closed shells (SPEC.md, Rims); on which side a ray
-// begins is what most of seven rays from there say, a back met first meaning inside.
-// Of two hits whose distances differ by at most 1e-12 of themselves, that of the lower instance and then of the lower
-// face is the closest.
+// patch goes on as its polynomials do beyond each of its sides by kDomainSlack in uv_face (at most kMostPatchSlack of
+// the patch), so that neighbouring patches, whose control points are rounded each in its own frame, leave no crack. The
+// backs of rims are no surface for rays that begin outside of the part's closed shells (SPEC.md, Rims); on which side a
+// ray begins is what most of seven rays from there say, a back met first meaning inside. Of two hits whose distances
+// differ by at most 1e-12 of themselves, that of the lower instance and then of the lower face is the closest.
 #pragma once
 
 #include "format/bezier_reference.h"

@@ -139,7 +139,9 @@ TRIMRAY_CONST float kUvBelowOne = 0.99999994f;
 // (4e-7) over 2 pi, and the roundings of uv_scale, product and sum. A spline that closes needs patch_overlap times
 // uv_scale (shaders/shared/patch_newton.h): of two bicubic patches with |S_u| = 1 this much where the ray meets them at
 // 11 degrees, 8e-7 at a right angle. Borders that need to reach farther lie farther out in the pack.
+// A Bezier patch goes on beyond each of its sides by as much, but by no more than kMostPatchSlack in uv_patch.
 TRIMRAY_CONST float kDomainSlack = 4e-6f;
+TRIMRAY_CONST float kMostPatchSlack = 1e-3f;
 
 // CellEntry: a piece that passes through a mixed cell. Query q = (u, v) in a cell of grid index floor(uv * grid):
 //   inside = corner_inside  XOR over the cell's entries of  horizontal(e)  XOR  vertical(e)

@@ -24,6 +24,7 @@ struct NewtonPatch {
     Evaluate evaluate;
     scalar enough;   // residual of the last step, patch units
     scalar rounding; // residual that rounding alone may leave, patch units
+    scalar2 slack;   // kDomainSlack in uv_patch
 
     HWY_ATTR SurfacePoint at(real2 uv) const { return evaluate(source, first_control_point, degree_u, degree_v, uv); }
 };
@@ -157,7 +158,7 @@ FN_LARGE Root end_of(const NewtonPatch& newton, const Search& search, real3 orig
 {
     Root end;
     const NewtonRoot root = newton_root(search.s, search.next, search.uv, search.exact, origin, direction);
-    const real2 overlap = patch_overlap(root_blur(search.seen, newton.rounding));
+    const real2 overlap = patch_overlap(root_blur(search.seen, newton.rounding), newton.slack);
     end.uv = root.uv;
     end.t = root.t;
     end.found =

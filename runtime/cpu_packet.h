@@ -337,7 +337,8 @@ private:
                 degree_v,
                 find_evaluate(patch.shape),
                 last_residual(job_.error_px * target.view.pixel),
-                patch_rounding(degree_u, degree_v)};
+                patch_rounding(degree_u, degree_v),
+                patch_slack(scalar2(patch.uv_scale[0], patch.uv_scale[1]))};
     }
 
     /// The leaf's plane, evaluated when the block first asks.
@@ -370,7 +371,7 @@ private:
                          newton.enough, leaf_start(scalar2(start_u, start_v), box.uv_lo, box.uv_hi), moving);
         if (!any_lane(end.settled))
             return;
-        const real2 overlap = patch_overlap(root_blur(seen_point(end.s, planes), newton.rounding));
+        const real2 overlap = patch_overlap(root_blur(seen_point(end.s, planes), newton.rounding), newton.slack);
         const mask inside =
             end.settled && abs(end.uv.x - 0.5f) <= 0.5f + overlap.x && abs(end.uv.y - 0.5f) <= 0.5f + overlap.y;
         const real t = dot(end.s.p - origin, direction) / dot(direction, direction);

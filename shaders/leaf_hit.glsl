@@ -346,13 +346,15 @@ void offer_end(PatchRay ray, PatchRecord patch, FaceRecord face, NewtonPatch new
     if (!search.settled)
         return;
     NewtonRoot root = newton_root(search.s, search.next, search.uv, search.exact, ray.origin, ray.direction);
-    vec2 overlap = patch_overlap(root_blur(search.seen, newton.rounding));
+    vec2 moved = root_blur(search.seen, newton.rounding);
+    vec2 overlap = patch_overlap(moved, patch_slack(vec2(patch.uv_scale[0], patch.uv_scale[1])));
     vec2 within = clamp(root.uv, 0.0f, 1.0f);
     bool own = all(greaterThanEqual(within, box.uv_lo)) && all(lessThanEqual(within, box.uv_hi));
     // a leaf beside it finds the same root elsewhere along the ray, by as much as rounding moves it on the patch
     float blur = 0.0f;
     if (own != hit.own)
-        blur = (overlap.x * length(search.s.du) + overlap.y * length(search.s.dv)) / length(ray.direction);
+        blur = dot(min(moved, vec2(kNewtonOutside)), vec2(length(search.s.du), length(search.s.dv))) /
+               length(ray.direction);
     vec2 off = abs(root.uv - 0.5f) - overlap;
     if (max(off.x, off.y) > 0.5f || !in_range(ray, root.t, blur, hit))
         return;

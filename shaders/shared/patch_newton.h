@@ -118,9 +118,18 @@ FN real2 root_blur(SeenPoint s, real rounding)
     return real2(per_det * length(s.dv), per_det * length(s.du));
 }
 
-FN real2 patch_overlap(real2 blur)
+// By how much a patch goes on beyond its sides, uv_patch (pack_layout.h: kDomainSlack)
+FN scalar2 patch_slack(scalar2 uv_scale)
 {
-    return real2(min(blur.x, real(kNewtonOutside)), min(blur.y, real(kNewtonOutside)));
+    return scalar2(min(kDomainSlack / max(uv_scale.x, -uv_scale.x), kMostPatchSlack),
+                   min(kDomainSlack / max(uv_scale.y, -uv_scale.y), kMostPatchSlack));
+}
+
+// slack: patch_slack
+FN real2 patch_overlap(real2 blur, scalar2 slack)
+{
+    return real2(min(max(blur.x, real(slack.x)), real(kNewtonOutside)),
+                 min(max(blur.y, real(slack.y)), real(kNewtonOutside)));
 }
 
 // A root and its distance along the ray
