@@ -266,10 +266,11 @@ private:
 };
 
 /// The roots of the rays `open`, found in the leaf's quarters and in those of each that leaves something open: 16 at
-/// once, of any of the rays. Returns the rays that may have more roots than those listed: where too many parts stay
-/// open, 16 that are not split stand for the leaf.
+/// once, of any of the rays. Returns the rays that may have more roots than those listed, or one that is_unsure(search,
+/// root): where too many parts stay open, 16 that are not split stand for the leaf.
+template <class IsUnsure>
 FN_LARGE uint list_roots(const NewtonPatch& newton, const LeafPlane& leaf, const PacketRays& rays, uint open,
-                         RootLists& roots, uint64_t& steps)
+                         IsUnsure is_unsure, RootLists& roots, uint64_t& steps)
 {
     WaitingParts parts;
     const auto share_of = [](uint depth) { return 1.0f / float(1u << depth); };
@@ -315,8 +316,9 @@ FN_LARGE uint list_roots(const NewtonPatch& newton, const LeafPlane& leaf, const
         if (any_lane(searched)) {
             const Search search = find_root(newton, leaf, rectangle, planes, s, seen, searched, steps);
             unknown = unknown && !search.complete;
-            doubt = searched && search.blurred;
-            doubtful |= list(end_of(newton, search, origin, direction), part.ray, roots);
+            const Root root = end_of(newton, search, origin, direction);
+            doubt = searched && (search.blurred || is_unsure(search, root));
+            doubtful |= list(root, part.ray, roots);
         }
         doubt = doubt || (unknown && at_end);
         for (uint bits = lane_bits(doubt); bits != 0; bits &= bits - 1)

@@ -311,8 +311,8 @@ private:
             const Rectangle whole{real2(leaf.middle), real2(leaf.half_side), real(1.0f), bend, mask(false)};
             const Search search = find_root(newton, leaf, whole, planes, middle, seen, searched, work_.newton_steps);
             open = open || (searched && !search.complete);
-            doubtful = searched && search.blurred;
             const Root root = end_of(newton, search, origin, direction);
+            doubtful = searched && (search.blurred || is_unsure(target, newton, search, root));
             const mask near = root.found && in_range(target, root.t, hit);
             if (any_lane(near))
                 offer(target, near, root.t, root.uv, root.normal, hit);
@@ -336,9 +336,43 @@ private:
                 degree_u,
                 degree_v,
                 find_evaluate(patch.shape),
-                last_residual(job_.error_px * target.view.pixel),
+                last_residual(job_.error_px * target.view.pixel * std::abs(target.view.tau)),
                 patch_rounding(degree_u, degree_v),
                 patch_slack(scalar2(patch.uv_scale[0], patch.uv_scale[1]))};
+    }
+
+    /// Roots before the eye of which rounding decides more than a certificate leaves open: how far they are, or whether
+    /// the face holds them.
+    HWY_ATTR HWY_INLINE mask is_unsure(const Target& target, const NewtonPatch& newton, const Search& search,
+                                       const Root& root)
+    {
+        const real footprint = target.view.pixel * (target.view.tau + root.t);
+        const real off = more_than_hair(footprint, newton.rounding);
+        const mask asked = search.settled && off > 0.0f && footprint > 0.0f;
+        if (!any_lane(asked))
+            return asked;
+        const real2 blur = root_blur(search.seen, off);
+        const mask there = asked && root.found;
+        return (asked && is_beside_side(root.uv, blur, newton.slack)) ||
+               (there && is_depth_unsure(search.s, search.seen, off, footprint)) ||
+               is_beside_border(target, root.uv, blur, there);
+    }
+
+    /// Lanes of `asked` whose root lies on the other side of a border of the face if it is moved by `blur`.
+    HWY_ATTR HWY_NOINLINE mask is_beside_border(const Target& target, real2 uv_patch, real2 blur, mask asked)
+    {
+        const PatchRecord& patch = target.patch;
+        const real2 uv = face_uv(patch, uv_patch);
+        const real2 uv_blur(blur.x * std::abs(patch.uv_scale[0]), blur.y * std::abs(patch.uv_scale[1]));
+        mask beside = asked && is_beside_side(uv, uv_blur, scalar2(kDomainSlack, kDomainSlack));
+        if ((target.face.flags & kFaceNaturalBorder) != 0)
+            return beside;
+        const mask inside = inside_loops(target, clamp_to_domain(uv), asked);
+        for (int corner = 0; corner < kCornerCount; ++corner) {
+            const mask moved = inside_loops(target, clamp_to_domain(corner_around(uv, uv_blur, corner)), asked);
+            beside = beside || (asked && differ(moved, inside));
+        }
+        return beside;
     }
 
     /// The leaf's plane, evaluated when the block first asks.
@@ -386,7 +420,10 @@ private:
     {
         RootLists roots;
         const PacketRays rays = packet_rays(origin, direction, planes);
-        const uint doubtful = list_roots(newton, leaf, rays, lane_bits(open), roots, work_.newton_steps);
+        const uint doubtful = list_roots(
+            newton, leaf, rays, lane_bits(open),
+            [&](const Search& search, const Root& root) HWY_ATTR { return is_unsure(target, newton, search, root); },
+            roots, work_.newton_steps);
         const int most = *std::max_element(roots.count, roots.count + kLanes);
         for (int i = 0; i < most; ++i) {
             uint has = 0;
@@ -407,12 +444,18 @@ private:
         return real2(clamp(uv.x, real(0.0f), real(kUvBelowOne)), clamp(uv.y, real(0.0f), real(kUvBelowOne)));
     }
 
+    /// But for the torus' second angle, which is unwrapped.
+    HWY_ATTR static real2 face_uv(const PatchRecord& patch, real2 uv_patch)
+    {
+        return real2(patch.uv_offset[0] + patch.uv_scale[0] * uv_patch.x,
+                     patch.uv_offset[1] + patch.uv_scale[1] * uv_patch.y);
+    }
+
     /// Takes the roots that lie in the face's domain and inside its trims.
     HWY_ATTR HWY_INLINE void offer(Target& target, mask near, real t, real2 uv_patch, real3 normal, PacketHit& hit)
     {
         const PatchRecord& patch = target.patch;
-        real2 uv(patch.uv_offset[0] + patch.uv_scale[0] * uv_patch.x,
-                 patch.uv_offset[1] + patch.uv_scale[1] * uv_patch.y);
+        real2 uv = face_uv(patch, uv_patch);
         if ((patch.shape & 0xffu) == kKindTorus) {
             // pack_layout.h: the torus' v is unwrapped upwards
             const float half_turn = kPi * patch.uv_scale[1];
@@ -474,8 +517,8 @@ private:
     HWY_ATTR HWY_NOINLINE mask in_rim(const Target& target, mask asked, real2 uv)
     {
         mask beside_rim = asked;
-        for (int corner = 0; corner < kRimCorners && any_lane(beside_rim); ++corner) {
-            const real2 q = rim_corner(uv, rim_width(target.face.flags), corner);
+        for (int corner = 0; corner < kCornerCount && any_lane(beside_rim); ++corner) {
+            const real2 q = corner_around(uv, real2(rim_width(target.face.flags)), corner);
             beside_rim = beside_rim && in_domain(q);
             if ((target.face.flags & kFaceNaturalBorder) == 0 && any_lane(beside_rim))
                 beside_rim = beside_rim && inside_loops(target, clamp_to_domain(q), beside_rim);

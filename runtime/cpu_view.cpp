@@ -399,7 +399,7 @@ PatchView make_patch_view(const PatchRecord& patch, const InstanceView& instance
     out.mm_per_t = float(patch.scale / instance.k);
     // the patch's own arithmetic, |q| about 1, and one rounding of base_mm
     out.slack_mm = float(4e-7 * (1 + largest) * out.mm_per_t + 1.2e-7 * std::abs(out.base_mm));
-    out.pixel = float(std::abs(tau) * per_scale * std::sqrt(dot(instance.step_x, instance.step_x)));
+    out.pixel = float(std::sqrt(dot(instance.step_x, instance.step_x)));
     return out;
 }
 

@@ -89,7 +89,7 @@ struct PatchView {
     float w0[3], step_x[3], step_y[3]; // patch axes
     float base_mm, mm_per_t;           // tau - tau_ref of a point at t on the ray = base_mm + mm_per_t * t
     float slack_mm;                    // rounding of that
-    float pixel;                       // a pixel's width at the patch's origin, patch units
+    float pixel;                       // a pixel's width where tau is 1
 };
 
 /// A leaf that rays of a block may meet, nearest first.

@@ -45,7 +45,7 @@ struct PatchRay {
     float anchor; // tau at t = 0
     float past;   // anchor - view.tau_ref
     float slack;  // rounding of a hit's `past`
-    float pixel;  // width of a pixel there, patch units
+    float pixel;  // width of a pixel at tau = 1, patch units
 };
 
 // Source: shaders/shared/precision.h
@@ -71,7 +71,7 @@ PatchRay patch_ray(FrameInstance instance, PatchRecord patch, vec2 pixel)
     ray.past = ray.anchor - view.tau_ref;
     // the patch's own arithmetic, |q| about 1, and one rounding of `past`
     ray.slack = 4e-7f * (1.0f + length(middle) * per_scale) / length(ray.direction) + 1.2e-7f * abs(ray.past);
-    ray.pixel = abs(ray.anchor) * instance.footprint * per_scale;
+    ray.pixel = instance.footprint * per_scale;
     return ray;
 }
 
@@ -159,16 +159,30 @@ vec3 outward(PatchRecord patch, FaceRecord face, vec3 n)
     return left_handed != reversed ? -n : n;
 }
 
-// Whether a point is inside the face's trims and, if asked, beside its rim (shaders/shared/rim.h)
-bool inside_face(uint face_id, FaceRecord face, vec2 uv, bool beside_rim)
+// Whether a point is inside the face's trims and, if asked, beside its rim (shaders/shared/rim.h). `unsure`: it may be
+// on the other side of a trim, for rounding may have moved it by `blur`; 0 where that is too little to matter.
+bool inside_face(uint face_id, FaceRecord face, vec2 uv, bool beside_rim, vec2 blur, out bool unsure)
 {
-    vec2 width = rim_width(face.flags);
-    for (int corner = beside_rim ? kRimCorners : 0; corner >= 0; --corner) {
-        vec2 q = corner > 0 ? rim_corner(uv, width, corner - 1) : uv;
-        if (!in_domain(q) || !inside_trims(face_id, face, min(q, vec2(kUvBelowOne))))
-            return false;
+    unsure = false;
+    bool inside = true;
+    int blurred = blur.x > 0.0f ? kCornerCount : 0;
+    int count = 1 + blurred + (beside_rim ? kCornerCount : 0);
+    for (int i = 0; i < count; ++i) {
+        bool of_rim = i > blurred;
+        vec2 q = uv;
+        if (i > 0)
+            q = corner_around(uv, of_rim ? rim_width(face.flags) : blur, (i - 1) % kCornerCount);
+        if (!of_rim)
+            q = clamp(q, vec2(0.0f), vec2(kUvBelowOne));
+        bool here = in_domain(q) && inside_trims(face_id, face, min(q, vec2(kUvBelowOne)));
+        if (i == 0 || of_rim)
+            inside = inside && here;
+        else
+            unsure = unsure || here != inside;
+        if (!inside && i >= blurred)
+            break;
     }
-    return true;
+    return inside;
 }
 
 // Hits of the ray's patch count as equally near as the nearest so far within this: the same whichever comes first
@@ -186,9 +200,9 @@ bool in_range(PatchRay ray, float t, float blur, Hit hit)
 
 // Takes the root at t if it is in the face's domain, inside its trims and nearer than what was found. Of two hits
 // within rounding one that lies in its leaf stays, for no bound hides that leaf, then the one of the lower instance and
-// leaf, whatever the order. `back`: it may be a rim's; `blur`: as in in_range.
+// leaf, whatever the order. `back`: it may be a rim's; `blur`: as in in_range; `uv_blur`: as in inside_face.
 void offer(PatchRay ray, uint face_id, FaceRecord face, uint leaf, uint instance, float t, vec2 uv_patch, vec2 uv_face,
-           bool back, bool own, float blur, inout Hit hit)
+           bool back, bool own, float blur, vec2 uv_blur, inout Hit hit)
 {
     vec2 off = abs(uv_face - 0.5f);
     if (max(off.x, off.y) > 0.5f + kDomainSlack)
@@ -201,7 +215,11 @@ void offer(PatchRay ray, uint face_id, FaceRecord face, uint leaf, uint instance
     if (!(past < hit.past + (first ? near : -near)))
         return;
     vec2 uv = clamp(uv_face, vec2(0.0f), vec2(kUvBelowOne));
-    if (!inside_face(face_id, face, uv, back && rims_cut))
+    bool unsure;
+    bool inside = inside_face(face_id, face, uv, back && rims_cut, uv_blur, unsure);
+    if (unsure)
+        hit.doubt = min(hit.doubt, past - near);
+    if (!inside)
         return;
     hit.past = past;
     hit.back = back;
@@ -293,7 +311,7 @@ void native_hit(PatchRay ray, PatchRecord patch, FaceRecord face, uint kind, uin
         vec2 uv_patch = native_uv(kind, patch, p);
         bool back = rims && dot(ray.direction, outward(patch, face, native_normal(kind, patch, p))) > 0.0f;
         offer(ray, patch.face, face, leaf, instance, roots[i], uv_patch, face_uv(patch, kind, uv_patch), back, true,
-              0.0f, hit); // alike from all leaves of its patch
+              0.0f, vec2(0.0f), hit); // alike from all leaves of its patch
     }
     iterations += 4u;
 }
@@ -347,7 +365,8 @@ void offer_end(PatchRay ray, PatchRecord patch, FaceRecord face, NewtonPatch new
         return;
     NewtonRoot root = newton_root(search.s, search.next, search.uv, search.exact, ray.origin, ray.direction);
     vec2 moved = root_blur(search.seen, newton.rounding);
-    vec2 overlap = patch_overlap(moved, patch_slack(vec2(patch.uv_scale[0], patch.uv_scale[1])));
+    vec2 slack = patch_slack(vec2(patch.uv_scale[0], patch.uv_scale[1]));
+    vec2 overlap = patch_overlap(moved, slack);
     vec2 within = clamp(root.uv, 0.0f, 1.0f);
     bool own = all(greaterThanEqual(within, box.uv_lo)) && all(lessThanEqual(within, box.uv_hi));
     // a leaf beside it finds the same root elsewhere along the ray, by as much as rounding moves it on the patch
@@ -355,8 +374,22 @@ void offer_end(PatchRay ray, PatchRecord patch, FaceRecord face, NewtonPatch new
     if (own != hit.own)
         blur = dot(min(moved, vec2(kNewtonOutside)), vec2(length(search.s.du), length(search.s.dv))) /
                length(ray.direction);
+    if (!in_range(ray, root.t, blur, hit))
+        return;
     vec2 off = abs(root.uv - 0.5f) - overlap;
-    if (max(off.x, off.y) > 0.5f || !in_range(ray, root.t, blur, hit))
+    bool on_patch = max(off.x, off.y) <= 0.5f;
+    vec2 uv_face = face_uv(patch, kKindBezier, root.uv);
+    vec2 uv_blur = vec2(0.0f);
+    float footprint = ray.pixel * (ray.anchor + root.t);
+    float off_by = more_than_hair(footprint, newton.rounding);
+    if (off_by > 0.0f) {
+        vec2 patch_blur = root_blur(search.seen, off_by);
+        uv_blur = patch_blur * abs(vec2(patch.uv_scale[0], patch.uv_scale[1]));
+        if (is_beside_side(root.uv, patch_blur, slack) || is_beside_side(uv_face, uv_blur, vec2(kDomainSlack)) ||
+            (on_patch && is_depth_unsure(search.s, search.seen, off_by, footprint)))
+            hit.doubt = min(hit.doubt, ray.past + root.t - as_near(ray, hit) - blur);
+    }
+    if (!on_patch)
         return;
     bool back = false;
     if (rims) {
@@ -366,8 +399,7 @@ void offer_end(PatchRay ray, PatchRecord patch, FaceRecord face, NewtonPatch new
             s = evaluate(newton, within);
         back = dot(ray.direction, outward(patch, face, cross(s.du, s.dv))) > 0.0f;
     }
-    offer(ray, patch.face, face, leaf, instance, root.t, root.uv, face_uv(patch, kKindBezier, root.uv), back, own, blur,
-          hit);
+    offer(ray, patch.face, face, leaf, instance, root.t, root.uv, uv_face, back, own, blur, uv_blur, hit);
 }
 
 #include "shaders/stochastic.glsl"
@@ -413,7 +445,7 @@ void bezier_hit(PatchRay ray, PatchRecord patch, FaceRecord face, LeafBox box, f
     if (local_floats > 0u)
         copy_control_points(patch, (degree_u + 1u) * (degree_v + 1u) * (newton.rational ? 4u : 3u));
     newton.planes = ray_planes(ray.origin, ray.direction);
-    newton.enough = last_residual(view.error_px * ray.pixel);
+    newton.enough = last_residual(view.error_px * ray.pixel * abs(ray.anchor));
     newton.rounding = patch_rounding(newton.degree_u, newton.degree_v);
     newton.work = 1u + bezier_iterations(degree_u, degree_v);
     if (has_feature(kFeatureStochastic)) {

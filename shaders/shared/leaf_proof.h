@@ -242,6 +242,28 @@ FN mask is_blurred(real2 uv, real2 blur)
     return (blur.x > kNewtonOutside && beside_u <= blur.x) || (blur.y > kNewtonOutside && beside_v <= blur.y);
 }
 
+// By how much more than a hair rounding moves a point, patch units; `footprint`: of a hit, patch units
+FN real more_than_hair(real footprint, scalar rounding)
+{
+    return rounding - kHairPx * footprint;
+}
+
+// True where a root at `uv`, moved by `blur`, may lie on either side of a side of [-slack, 1 + slack]^2
+FN mask is_beside_side(real2 uv, real2 blur, scalar2 slack)
+{
+    real beyond_u = abs(uv.x - 0.5f) - (0.5f + slack.x);
+    real beyond_v = abs(uv.y - 0.5f) - (0.5f + slack.y);
+    mask outside = beyond_u > blur.x || beyond_v > blur.y;
+    return !outside && (beyond_u > -blur.x || beyond_v > -blur.y);
+}
+
+// True where a point moved by `off` moves a root along its ray by more than a depth may be off: off / sin b, b the
+// ray's slope
+FN mask is_depth_unsure(SurfacePoint s, SeenPoint seen, real off, real footprint)
+{
+    return off * length(cross(s.du, s.dv)) > kDepthPx * footprint * abs(seen.det);
+}
+
 // Where a ray's roots in a rectangle may lie, uv_patch; empty where hi < lo
 struct RootBox {
     real2 lo;

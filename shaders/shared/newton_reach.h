@@ -24,6 +24,11 @@ FN scalar patch_rounding(int degree_u, int degree_v)
     return 1.4142136f * (2.0f + 2.0f * scalar(degree_u + degree_v) + 4.0f) * kRounding;
 }
 
+// What a certificate leaves open: whatever changes where a ray is moved by so many pixels, and a depth by so many of
+// the hit's footprints, a pixel's width there.
+const scalar kHairPx = 1e-3f;
+const scalar kDepthPx = 0.1f;
+
 // A rectangle's bend and noise below which it holds one root at most, with room for their own rounding
 const scalar kOneRoot = 0.99f;
 

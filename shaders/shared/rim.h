@@ -13,7 +13,9 @@
 
 SHARED_OPEN
 
-// How near its border a hit may lie in the rim, uv_face. Domain: a face with kFaceRims
+// How near its border a hit may lie in the rim, uv_face. It does if one of the corners so far around it is outside of
+// the face: along a border that is straight for so short a way, a point within `width` of it along u and v has one of
+// them beyond it. Domain: a face with kFaceRims
 FN scalar2 rim_width(uint face_flags)
 {
     uint k_u = face_flags >> kFaceRimBit & kFaceRimMask;
@@ -21,10 +23,9 @@ FN scalar2 rim_width(uint face_flags)
     return scalar2(1.0f / scalar(1u << k_u), 1.0f / scalar(1u << k_v));
 }
 
-// A hit lies in the rim if one of these four points (0 to 3) is outside of the face: along a border that is straight
-// for so short a way, a point within `width` of it along u and v has one of them beyond it.
-const int kRimCorners = 4;
-FN real2 rim_corner(real2 uv, scalar2 width, int corner)
+// The corners (0 to 3) of the rectangle around uv with half sides `width`
+const int kCornerCount = 4;
+FN real2 corner_around(real2 uv, real2 width, int corner)
 {
     return real2(uv.x + ((corner & 1) != 0 ? width.x : -width.x), uv.y + ((corner & 2) != 0 ? width.y : -width.y));
 }
