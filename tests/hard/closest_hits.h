@@ -157,32 +157,57 @@ inline uint32_t shrinking(bool vulkan)
 #endif
 }
 
+struct NamedTracer {
+    std::string name; // "cpu", "vulkan", or "plain", whose figures are only printed
+    std::unique_ptr<Tracer> tracer;
+};
+
+/// A scene's tracers on one device, on the CPU with the plain one before it if that is asked for. Without a Vulkan
+/// driver that tracer is named as skipped.
+inline std::vector<NamedTracer> tracers_on(bool vulkan, const std::shared_ptr<const Scene>& scene)
+{
+    std::vector<NamedTracer> tracers;
+    if (vulkan)
+        keep_vulkan_loaded();
+    Result<std::unique_ptr<Tracer>> made = vulkan ? make_vulkan_tracer(scene, true, false) : make_cpu_tracer(scene);
+    if (!made.ok() && vulkan && made.error().code == ErrorCode::NoDevice) {
+        std::cout << "skipped vulkan: " << made.error().detail << "\n";
+        return tracers;
+    }
+    if (!made.ok()) {
+        ADD_FAILURE() << made.error().where << ": " << made.error().detail;
+        return tracers;
+    }
+    if (plain_asked() && !vulkan)
+        tracers.push_back({"plain", std::make_unique<PlainTracer>(*scene)});
+    tracers.push_back({vulkan ? "vulkan" : "cpu", std::move(*made)});
+    return tracers;
+}
+
+inline std::vector<NamedTracer> tracers_of(const std::shared_ptr<const Scene>& scene)
+{
+    std::vector<NamedTracer> tracers = tracers_on(false, scene);
+    for (NamedTracer& on_device : tracers_on(true, scene))
+        tracers.push_back(std::move(on_device));
+    return tracers;
+}
+
 /// Hands over the score of a tracer and prints it; expects no NaN and no open search. Sides are `shrinking` times
 /// shorter; without a Vulkan driver that tracer is named as skipped.
 inline void on_tracer(bool vulkan, const std::shared_ptr<const Scene>& scene, const std::vector<View>& views,
                       const std::function<void(const Score&)>& check)
 {
-    if (vulkan)
-        keep_vulkan_loaded();
-    auto tracer = vulkan ? make_vulkan_tracer(scene, true, false) : make_cpu_tracer(scene);
-    if (!tracer.ok() && vulkan && tracer.error().code == ErrorCode::NoDevice) {
-        std::cout << "skipped vulkan: " << tracer.error().detail << "\n";
-        return;
-    }
-    ASSERT_TRUE(tracer.ok()) << tracer.error().where << ": " << tracer.error().detail;
     const ClosestReference closest(scene->pack.image);
-    if (plain_asked() && !vulkan) {
-        PlainTracer plain(*scene);
-        Score s = score(plain, closest, views, shrinking(false));
-        s.tracer = plain.device_name();
+    for (const auto& [name, tracer] : tracers_on(vulkan, scene)) {
+        Score s = score(*tracer, closest, views, shrinking(vulkan));
+        s.tracer = name;
         std::cout << s << "\n";
+        if (name == "plain")
+            continue;
+        EXPECT_EQ(s.not_finite, 0u) << s;
+        EXPECT_EQ(s.open, 0u) << s;
+        check(s);
     }
-    Score s = score(**tracer, closest, views, shrinking(vulkan));
-    s.tracer = vulkan ? "vulkan" : "cpu";
-    std::cout << s << "\n";
-    EXPECT_EQ(s.not_finite, 0u) << s;
-    EXPECT_EQ(s.open, 0u) << s;
-    check(s);
 }
 
 inline void on_both_tracers(const std::shared_ptr<const Scene>& scene, const std::vector<View>& views,
