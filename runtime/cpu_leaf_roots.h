@@ -12,6 +12,7 @@
 #include "shaders/shared/leaf_proof.h"
 
 #include <algorithm>
+#include <cassert>
 #include <cstdint>
 
 SHARED_OPEN
@@ -39,9 +40,10 @@ FN uint64_t lane_count(mask lanes)
 struct Rectangle {
     real2 middle;
     real2 half_side;
-    real share;   // of the leaf's size
-    RayBend bend; // around its middle
-    mask last;    // it will not be split
+    real2 per_side; // 1 / half_side
+    real share;     // of the leaf's size
+    RayBend bend;   // around its middle
+    mask last;      // it will not be split
 };
 
 /// Newton's iteration in a rectangle, by lane
@@ -51,51 +53,44 @@ struct Search {
     mask complete; // proved: the rectangle holds no root but this one, and none if it has not settled
     mask blurred;  // rounding decides whether the root is the patch's
     SurfacePoint s;
-    SeenPoint seen;
     NewtonStep next;
     real2 uv;
+    real2 blur; // root_blur there
 };
 
 /// From the rectangle's middle, where the surface is `s`, in the lanes `moving`. Counts its `steps`.
 FN_LARGE Search find_root(const NewtonPatch& newton, const LeafPlane& leaf, const Rectangle& rectangle,
-                          const RayPlanes& planes, SurfacePoint s, SeenPoint seen, mask moving, uint64_t& steps)
+                          const RayPlanes& planes, const SurfacePoint& s, SeenPoint seen, mask moving, uint64_t& steps)
 {
-    const real2 middle = rectangle.middle;
-    const real2 half_side = rectangle.half_side;
-    const real2 per_side(1.0f / half_side.x, 1.0f / half_side.y);
-    Search search{mask(false), mask(false), mask(false), mask(false), s, seen, {}, middle};
+    const real2 middle = rectangle.middle, half_side = rectangle.half_side, per_side = rectangle.per_side;
+    Search search; // not zeroed: it is large
+    search.settled = search.exact = mask(false);
+    search.s = s;
+    real2& uv = search.uv = middle;
     RootBox where{middle - half_side, middle + half_side};
     mask none(false), near(false);
     const mask straight = holds_one(rectangle.bend, real(1.0f));
     // a lane that has settled stays where it is, so that the last round's point is every settled lane's
     for (int step = 0;; ++step) {
-        real2& uv = search.uv;
-        if (step > 0) {
-            search.s = newton.at(uv);
-            search.seen = seen_point(search.s, planes);
-        }
-        search.next = newton_step(search.seen, uv);
-        const NewtonStep& next = search.next;
-        const auto bend_here = [&]()
-                                   HWY_ATTR { return bend_from(rectangle.bend, farther(uv - middle, per_side)).bend; };
-        const mask on_ray = next.residual <= newton.rounding + next.blur;
-        if (any_lane(moving && (on_ray || next.residual <= newton.enough))) {
-            const real2 moved = next.uv - uv;
-            const real turn = bend_here() * farther(moved, per_side);
-            const mask exact = newton_exact(leaf, search.s, next, moved, turn, newton.rounding, newton.enough);
-            const mask found = moving && (exact || newton_settled(next, turn, near, newton.rounding));
-            search.exact = select(found, exact, search.exact);
-            search.settled = search.settled || found;
-            moving = moving && !found;
-        }
-        near = on_ray;
+        const NewtonStep next = newton_step(seen, uv);
+        const real2 moved = next.uv - uv;
+        const real off = farther(uv - middle, per_side);
+        const real turn = rectangle.bend.bend * farther(moved, per_side), left = bend_left(rectangle.bend, off);
+        const mask little = turns_little(turn, left);
+        const mask exact =
+            newton_exact(leaf, search.s, next, moved, turn, left, little, newton.rounding, newton.enough);
+        const mask found = moving && (exact || newton_settled(next, little, near, newton.rounding));
+        search.exact = search.exact || (found && exact);
+        search.settled = search.settled || found;
+        moving = moving && !found;
+        near = next.residual <= newton.rounding + next.blur;
         // a step that ends in the rectangle leaves a root there
         const mask beyond = moving && !next.singular && farther(next.uv - middle, per_side) > 1.0f;
         if (any_lane(beyond)) {
-            real bend = bend_here();
+            real bend = bend_from(rectangle.bend, off);
             if (any_lane(beyond && !straight))
-                bend = select(straight, bend, bend_around(leaf, planes, search.seen, rectangle.share).bend);
-            const RootBox less = narrowed(where, leaf, search.seen, uv, next.uv, bend, per_side, newton.rounding);
+                bend = select(straight, bend, bend_around(leaf, planes, seen, rectangle.share).bend);
+            const RootBox less = narrowed(where, leaf, seen, uv, next.uv, bend, per_side, newton.rounding);
             where.lo = select(beyond, less.lo, where.lo);
             where.hi = select(beyond, less.hi, where.hi);
             const mask empty = beyond && is_empty(where);
@@ -103,22 +98,26 @@ FN_LARGE Search find_root(const NewtonPatch& newton, const LeafPlane& leaf, cons
             moving = moving && !empty;
         }
         moving = moving && (straight || rectangle.last || mask(step < kGrazingSteps));
-        if (!any_lane(moving) || step == kNewtonSteps)
+        if (!any_lane(moving) || step == kNewtonSteps) {
+            search.next = next;
+            search.blur = root_blur(seen, newton.rounding);
+            // one root at most in a rectangle as large as to hold it
+            search.complete = none || (search.settled && holds_one(rectangle.bend, max(off, real(1.0f))));
             break;
+        }
         steps += lane_count(moving);
         const real2 to =
             real2(kept_near(next.uv.x, middle.x, half_side.x), kept_near(next.uv.y, middle.y, half_side.y));
         const mask stuck = newton_stuck(next, uv, to);
         uv = select(moving, to, uv);
         moving = moving && !stuck;
+        search.s = newton.at(uv);
+        seen = seen_point(search.s, planes);
     }
-    // one root at most in a rectangle as large as to hold it
-    const real off = max(farther(search.uv - middle, per_side), real(1.0f));
-    search.blurred = search.settled && is_blurred(search.uv, root_blur(search.seen, newton.rounding));
-    search.complete = none || (search.settled && holds_one(rectangle.bend, off));
+    search.blurred = search.settled && is_blurred(search.uv, search.blur);
     const mask open = search.settled && !search.complete;
     if (any_lane(open)) {
-        const RayBend around = bend_around(leaf, planes, search.seen, rectangle.share);
+        const RayBend around = bend_around(leaf, planes, seen, rectangle.share);
         search.complete = search.complete || (open && is_only_root(where, search.uv, around, per_side));
     }
     return search;
@@ -158,7 +157,7 @@ FN_LARGE Root end_of(const NewtonPatch& newton, const Search& search, real3 orig
 {
     Root end;
     const NewtonRoot root = newton_root(search.s, search.next, search.uv, search.exact, origin, direction);
-    const real2 overlap = patch_overlap(root_blur(search.seen, newton.rounding), newton.slack);
+    const real2 overlap = patch_overlap(search.blur, newton.slack);
     end.uv = root.uv;
     end.t = root.t;
     end.found =
@@ -167,21 +166,12 @@ FN_LARGE Root end_of(const NewtonPatch& newton, const Search& search, real3 orig
     return end;
 }
 
-/// A packet's rays in a patch's space, to be chosen from by lane.
+/// A packet's rays in a patch's space.
 struct PacketRays {
-    alignas(64) float values[14][kLanes];
+    real3 origin;
+    real3 direction;
+    RayPlanes planes;
 };
-
-FN PacketRays packet_rays(real3 origin, real3 direction, const RayPlanes& planes)
-{
-    const real* const from[14] = {&origin.x,    &origin.y,    &origin.z,    &direction.x, &direction.y,
-                                  &direction.z, &planes.n1.x, &planes.n1.y, &planes.n1.z, &planes.d1,
-                                  &planes.n2.x, &planes.n2.y, &planes.n2.z, &planes.d2};
-    PacketRays rays;
-    for (int i = 0; i < 14; ++i)
-        store(*from[i], rays.values[i]);
-    return rays;
-}
 
 constexpr int kMostRoots = 12; // of a ray in a leaf
 
@@ -218,125 +208,173 @@ FN uint list(const Root& root, const uint (&ray)[kLanes], RootLists& roots)
     return too_many;
 }
 
-/// Parts of a leaf that wait to be searched, each for a ray of the packet.
+/// Parts of a leaf, one a lane, each for a ray of the packet.
+struct Parts {
+    mask lanes;
+    integer ray;
+    integer depth; // how often the leaf was split
+    real2 middle;
+};
+
+/// Parts that wait.
 class WaitingParts {
 public:
-    bool any() const { return count_ > 0; }
+    int count() const { return count_; }
 
-    /// The quarters of a part around (u, v) that is `depth` splits deep. False: there is no room.
-    bool push_quarters(uint ray, float u, float v, uint depth, scalar2 half_side)
+    /// Those of `lanes`.
+    HWY_ATTR void push(const Parts& parts, mask lanes)
     {
-        if (count_ + 4 > kMost)
-            return false;
-        for (int quarter = 0; quarter < 4; ++quarter) {
-            ray_[count_] = ray;
-            depth_[count_] = depth + 1;
-            u_[count_] = u + (quarter & 1 ? half_side.x : -half_side.x);
-            v_[count_] = v + (quarter & 2 ? half_side.y : -half_side.y);
-            ++count_;
-        }
-        return true;
+        assert(count_ + lane_count(lanes) <= kMost && "a ray has kMostParts, and 16 that are not split");
+        store_packed(parts.ray, lanes, ray_ + count_);
+        store_packed(parts.depth, lanes, depth_ + count_);
+        store_packed(parts.middle.x, lanes, u_ + count_);
+        count_ += store_packed(parts.middle.y, lanes, v_ + count_);
     }
 
-    /// Takes the last ones, lane by lane; the lanes without one get the bits of none.
-    struct Taken {
-        uint lanes;
-        alignas(64) uint ray[kLanes], depth[kLanes];
-        alignas(64) float u[kLanes], v[kLanes];
-    };
-    void take(Taken& taken)
+    /// The last ones; the lanes without one get the bits of another.
+    HWY_ATTR Parts take()
     {
         const int n = std::min(count_, int(kLanes));
         count_ -= n;
-        taken.lanes = n == kLanes ? 0xffffu : (1u << n) - 1;
-        for (int i = 0; i < kLanes; ++i) {
-            const int from = count_ + std::min(i, n - 1);
-            taken.ray[i] = ray_[from];
-            taken.depth[i] = depth_[from];
-            taken.u[i] = u_[from];
-            taken.v[i] = v_[from];
+        for (int i = count_ + n; i < count_ + kLanes; ++i) {
+            ray_[i] = ray_[count_];
+            depth_[i] = depth_[count_];
+            u_[i] = u_[count_];
+            v_[i] = v_[count_];
         }
+        return {lanes_of((1u << n) - 1u), load(ray_ + count_), load(depth_ + count_),
+                real2(load(u_ + count_), load(v_ + count_))};
     }
 
 private:
-    static constexpr int kMost = 1024;
+    static constexpr int kMost = kLanes * (kMostParts + 16);
     int count_ = 0;
-    uint ray_[kMost], depth_[kMost];
-    float u_[kMost], v_[kMost];
+    uint ray_[kMost + kLanes], depth_[kMost + kLanes];
+    float u_[kMost + kLanes], v_[kMost + kLanes];
+};
+
+/// Splits the leaf for the rays of a packet, as far as each may.
+class LeafSplitter {
+public:
+    LeafSplitter(const LeafPlane& leaf, WaitingParts& waiting) : leaf_(leaf), waiting_(waiting)
+    {
+        std::fill_n(left_, kLanes, kMostParts);
+    }
+
+    /// Lanes of parts whose rays have too many.
+    HWY_ATTR mask is_spent(const Parts& parts) const
+    {
+        return ((integer(spent_) >> parts.ray) & integer(1u)) == integer(1u);
+    }
+    uint spent() const { return spent_; } // rays
+
+    /// Puts the quarters that rays do not pass by to those waiting, of the parts `lanes` with these half sides.
+    HWY_ATTR void split(const Parts& parts, const Sight& sight, real2 half_side, mask lanes)
+    {
+        mask met[4];
+        uint met_by[4], any = 0;
+        for (int quarter = 0; quarter < 4; ++quarter) {
+            met[quarter] = lanes && !passes_quarter(sight, quarter);
+            any |= met_by[quarter] = lane_bits(met[quarter]);
+        }
+        if (any == 0)
+            return;
+        alignas(64) uint ray[kLanes];
+        store(parts.ray, ray);
+        const uint before = spent_;
+        for (; any != 0; any &= any - 1) {
+            const int i = __builtin_ctz(any);
+            for (const uint by : met_by)
+                left_[ray[i]] -= int(by >> i & 1u);
+            spent_ |= uint(left_[ray[i]] < 0) << ray[i];
+        }
+        const mask goes_on = !is_spent(parts);
+        for (int quarter = 0; quarter < 4; ++quarter) {
+            Parts of = parts;
+            of.depth = parts.depth + integer(1u);
+            const real u = 0.5f * half_side.x, v = 0.5f * half_side.y;
+            of.middle = real2(quarter & 1 ? parts.middle.x + u : parts.middle.x - u,
+                              quarter & 2 ? parts.middle.y + v : parts.middle.y - v);
+            waiting_.push(of, met[quarter] && goes_on);
+        }
+        for (uint bits = spent_ & ~before; bits != 0; bits &= bits - 1)
+            push_sixteenths(uint(__builtin_ctz(bits)));
+    }
+
+private:
+    HWY_ATTR void push_sixteenths(uint ray)
+    {
+        const integer i = lane_numbers(), column = i & integer(3u), row = i >> integer(2u);
+        const auto at = [](scalar middle, scalar half_side, integer k)
+                            HWY_ATTR { return middle + half_side * (0.5f * to_real(k) - 0.75f); };
+        const Parts parts{
+            mask(true), integer(ray), integer(2u),
+            real2(at(leaf_.middle.x, leaf_.half_side.x, column), at(leaf_.middle.y, leaf_.half_side.y, row))};
+        waiting_.push(parts, parts.lanes);
+    }
+
+    const LeafPlane& leaf_;
+    WaitingParts& waiting_;
+    uint spent_ = 0;
+    int left_[kLanes];
 };
 
 /// The roots of the rays `open`, found in the leaf's quarters and in those of each that leaves something open: 16 at
-/// once, of any of the rays. Returns the rays that may have more roots than those listed, or one that is_unsure(search,
-/// root): where too many parts stay open, 16 that are not split stand for the leaf.
+/// once, of any of the rays, and those searched apart from those that rays pass by. `sight`: of the whole leaf. Returns
+/// the rays that may have more roots than those listed, or one that is_unsure(search, root, direction): where too many
+/// parts stay open, 16 that are not split stand for the leaf.
 template <class IsUnsure>
-FN_LARGE uint list_roots(const NewtonPatch& newton, const LeafPlane& leaf, const PacketRays& rays, uint open,
-                         IsUnsure is_unsure, RootLists& roots, uint64_t& steps)
+FN_LARGE uint list_roots(const NewtonPatch& newton, const LeafPlane& leaf, const PacketRays& rays, const Sight& sight,
+                         mask open, IsUnsure is_unsure, RootLists& roots, uint64_t& steps)
 {
-    WaitingParts parts;
-    const auto share_of = [](uint depth) { return 1.0f / float(1u << depth); };
-    const auto push = [&](uint ray, float u, float v, uint depth) {
-        const scalar share = share_of(depth + 1);
-        return parts.push_quarters(ray, u, v, depth, scalar2(leaf.half_side.x * share, leaf.half_side.y * share));
-    };
-    uint doubtful = 0, spent = 0;
-    int left[kLanes];
-    for (uint bits = open; bits != 0; bits &= bits - 1) {
-        const uint ray = uint(__builtin_ctz(bits));
-        left[ray] = kMostParts - 4;
-        push(ray, leaf.middle.x, leaf.middle.y, 0);
-    }
-    WaitingParts::Taken part;
-    while (parts.any()) {
-        parts.take(part);
-        alignas(64) float shares[kLanes];
-        uint whole = 0; // parts that are not split
-        for (int i = 0; i < kLanes; ++i) {
-            shares[i] = share_of(part.depth[i]);
-            whole |= uint(part.depth[i] == kDeepestSplit || (spent >> part.ray[i] & 1) != 0) << i;
-        }
-        const mask taken = lanes_of(part.lanes);
-        const integer ray = load(part.ray);
-        const auto of_ray = [&](int i) HWY_ATTR { return gather(rays.values[i], ray); };
-        const real3 origin(of_ray(0), of_ray(1), of_ray(2)), direction(of_ray(3), of_ray(4), of_ray(5));
-        const RayPlanes planes{real3(of_ray(6), of_ray(7), of_ray(8)), of_ray(9),
-                               real3(of_ray(10), of_ray(11), of_ray(12)), of_ray(13)};
+    alignas(64) constexpr float kShares[kLanes] = {1.0f,      1.0f / 2,  1.0f / 4, 1.0f / 8,
+                                                   1.0f / 16, 1.0f / 32, 1.0f / 64}; // by depth
+    static_assert(kDeepestSplit == 6);
+    const real shares = load(kShares);
+    const scalar2 per_side(1.0f / leaf.half_side.x, 1.0f / leaf.half_side.y);
+    WaitingParts untested, unsearched;
+    LeafSplitter splitter(leaf, untested);
+    uint doubtful = 0;
+    splitter.split({open, lane_numbers(), integer(0u), leaf.middle}, sight, leaf.half_side, open);
+    while (untested.count() > 0 || unsearched.count() > 0) {
+        const bool search = untested.count() == 0 || unsearched.count() >= kLanes;
+        const Parts part = search ? unsearched.take() : untested.take();
+        const RayPlanes planes{lanes_from(rays.planes.n1, part.ray), lanes_from(rays.planes.d1, part.ray),
+                               lanes_from(rays.planes.n2, part.ray), lanes_from(rays.planes.d2, part.ray)};
         Rectangle rectangle;
-        rectangle.share = load(shares);
+        rectangle.middle = part.middle;
+        rectangle.share = lanes_from(shares, part.depth);
         rectangle.half_side = real2(leaf.half_side.x * rectangle.share, leaf.half_side.y * rectangle.share);
-        rectangle.middle = real2(load(part.u), load(part.v));
+        const real per_share = 1.0f / rectangle.share;
+        rectangle.per_side = real2(per_side.x * per_share, per_side.y * per_share);
         const SurfacePoint s = newton.at(rectangle.middle);
         const SeenPoint seen = seen_point(s, planes);
-        steps += uint64_t(__builtin_popcount(part.lanes));
+        const Sight of_part = sight_of(leaf, planes, s, seen, rectangle.share, newton.rounding);
         rectangle.bend = bend_around(leaf, planes, seen, rectangle.share);
-        mask unknown = taken && !passes_by(leaf, planes, s, seen, rectangle.share, newton.rounding);
-        const mask at_end = lanes_of(whole) || splits_in_vain(leaf, s, rectangle.bend, rectangle.share);
-        rectangle.last = at_end;
-        const mask searched = unknown && (is_searched(rectangle.bend) || at_end);
-        mask doubt(false);
-        if (any_lane(searched)) {
-            const Search search = find_root(newton, leaf, rectangle, planes, s, seen, searched, steps);
-            unknown = unknown && !search.complete;
-            const Root root = end_of(newton, search, origin, direction);
-            doubt = searched && (search.blurred || is_unsure(search, root));
-            doubtful |= list(root, part.ray, roots);
+        rectangle.last = part.depth == integer(uint(kDeepestSplit)) || splitter.is_spent(part) ||
+                         splits_in_vain(leaf, s, rectangle.bend, rectangle.share);
+        mask unknown = part.lanes;
+        if (!search) {
+            steps += lane_count(part.lanes);
+            unknown = unknown && !passes_by(of_part);
+            const mask searched = unknown && (is_searched(rectangle.bend) || rectangle.last);
+            unsearched.push(part, searched);
+            unknown = unknown && !searched;
+        } else {
+            const Search found = find_root(newton, leaf, rectangle, planes, s, seen, unknown, steps);
+            unknown = unknown && !found.complete;
+            const real3 origin = lanes_from(rays.origin, part.ray), direction = lanes_from(rays.direction, part.ray);
+            alignas(64) uint ray[kLanes];
+            store(part.ray, ray);
+            const Root root = end_of(newton, found, origin, direction);
+            doubtful |= list(root, ray, roots);
+            const mask unsure = part.lanes && (found.blurred || is_unsure(found, root, direction));
+            for (uint bits = lane_bits(unsure || (unknown && rectangle.last)); bits != 0; bits &= bits - 1)
+                doubtful |= 1u << ray[__builtin_ctz(bits)];
         }
-        doubt = doubt || (unknown && at_end);
-        for (uint bits = lane_bits(doubt); bits != 0; bits &= bits - 1)
-            doubtful |= 1u << part.ray[__builtin_ctz(bits)];
-        for (uint bits = lane_bits(unknown && !at_end); bits != 0; bits &= bits - 1) {
-            const int i = __builtin_ctz(bits);
-            const uint one = part.ray[i];
-            left[one] -= 4;
-            if ((spent >> one & 1) != 0 || (left[one] >= 0 && push(one, part.u[i], part.v[i], part.depth[i])))
-                continue;
-            spent |= 1u << one;
-            doubtful |= 1u << one;
-            for (int quarter = 0; quarter < 4; ++quarter)
-                push(one, leaf.middle.x + (quarter & 1 ? 0.5f : -0.5f) * leaf.half_side.x,
-                     leaf.middle.y + (quarter & 2 ? 0.5f : -0.5f) * leaf.half_side.y, 1);
-        }
+        splitter.split(part, of_part, rectangle.half_side, unknown && !rectangle.last);
     }
-    return doubtful;
+    return doubtful | splitter.spent();
 }
 
 SHARED_CLOSE

@@ -304,22 +304,24 @@ private:
         const RayBend bend = middle_bend(leaf, seen);
         const mask grazing = !holds_one(bend, real(1.0f));
         if (any_lane(moving && grazing))
-            moving = moving && !(grazing && passes_by(leaf, planes, middle, seen, real(1.0f), newton.rounding));
+            moving =
+                moving && !(grazing && passes_by(sight_of(leaf, planes, middle, seen, real(1.0f), newton.rounding)));
         const mask searched = moving && is_searched(bend);
         mask open = moving && !searched, doubtful(false);
         if (any_lane(searched)) {
-            const Rectangle whole{real2(leaf.middle), real2(leaf.half_side), real(1.0f), bend, mask(false)};
+            const scalar2 per_side(1.0f / leaf.half_side.x, 1.0f / leaf.half_side.y);
+            const Rectangle whole{leaf.middle, leaf.half_side, per_side, real(1.0f), bend, mask(false)};
             const Search search = find_root(newton, leaf, whole, planes, middle, seen, searched, work_.newton_steps);
             open = open || (searched && !search.complete);
             const Root root = end_of(newton, search, origin, direction);
-            doubtful = searched && (search.blurred || is_unsure(target, newton, search, root));
+            doubtful = searched && (search.blurred || is_unsure(target, newton, search, root, direction));
             const mask near = root.found && in_range(target, root.t, hit);
             if (any_lane(near))
                 offer(target, near, root.t, root.uv, root.normal, hit);
         }
         open = open && base + per_t * in_box.near < hit.best + target.view.slack_mm;
         if (any_lane(open))
-            doubtful = doubtful || split(target, newton, leaf, planes, open, origin, direction, hit);
+            doubtful = doubtful || split(target, newton, leaf, planes, middle, seen, open, origin, direction, hit);
         if (!any_lane(doubtful))
             return;
         // what it found may lie a little before its box, on the next leaf
@@ -344,17 +346,18 @@ private:
     /// Roots before the eye of which rounding decides more than a certificate leaves open: how far they are, or whether
     /// the face holds them.
     HWY_ATTR HWY_INLINE mask is_unsure(const Target& target, const NewtonPatch& newton, const Search& search,
-                                       const Root& root)
+                                       const Root& root, real3 direction)
     {
         const real footprint = target.view.pixel * (target.view.tau + root.t);
         const real off = more_than_hair(footprint, newton.rounding);
         const mask asked = search.settled && off > 0.0f && footprint > 0.0f;
         if (!any_lane(asked))
             return asked;
-        const real2 blur = root_blur(search.seen, off);
+        const real more = off * (1.0f / newton.rounding);
+        const real2 blur(more * search.blur.x, more * search.blur.y);
         const mask there = asked && root.found;
         return (asked && is_beside_side(root.uv, blur, newton.slack)) ||
-               (there && is_depth_unsure(search.s, search.seen, off, footprint)) ||
+               (there && is_depth_unsure(search.s, direction, off, footprint)) ||
                is_beside_border(target, root.uv, blur, there);
     }
 
@@ -416,13 +419,16 @@ private:
 
     /// Offers all roots of the rays `open`, found by splitting the leaf. Returns the rays that may have more.
     HWY_ATTR HWY_NOINLINE mask split(Target& target, const NewtonPatch& newton, const LeafPlane& leaf,
-                                     const RayPlanes& planes, mask open, real3 origin, real3 direction, PacketHit& hit)
+                                     const RayPlanes& planes, const SurfacePoint& middle, const SeenPoint& seen,
+                                     mask open, real3 origin, real3 direction, PacketHit& hit)
     {
         RootLists roots;
-        const PacketRays rays = packet_rays(origin, direction, planes);
+        const PacketRays rays{origin, direction, planes};
+        const Sight sight = sight_of(leaf, planes, middle, seen, real(1.0f), newton.rounding);
         const uint doubtful = list_roots(
-            newton, leaf, rays, lane_bits(open),
-            [&](const Search& search, const Root& root) HWY_ATTR { return is_unsure(target, newton, search, root); },
+            newton, leaf, rays, sight, open,
+            [&](const Search& search, const Root& root, real3 along)
+                HWY_ATTR { return is_unsure(target, newton, search, root, along); },
             roots, work_.newton_steps);
         const int most = *std::max_element(roots.count, roots.count + kLanes);
         for (int i = 0; i < most; ++i) {

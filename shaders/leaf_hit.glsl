@@ -386,7 +386,7 @@ void offer_end(PatchRay ray, PatchRecord patch, FaceRecord face, NewtonPatch new
         vec2 patch_blur = root_blur(search.seen, off_by);
         uv_blur = patch_blur * abs(vec2(patch.uv_scale[0], patch.uv_scale[1]));
         if (is_beside_side(root.uv, patch_blur, slack) || is_beside_side(uv_face, uv_blur, vec2(kDomainSlack)) ||
-            (on_patch && is_depth_unsure(search.s, search.seen, off_by, footprint)))
+            (on_patch && is_depth_unsure(search.s, ray.direction, off_by, footprint)))
             hit.doubt = min(hit.doubt, ray.past + root.t - as_near(ray, hit) - blur);
     }
     if (!on_patch)
@@ -485,6 +485,7 @@ void bezier_hit(PatchRay ray, PatchRecord patch, FaceRecord face, LeafBox box, f
         RayBend bend;
         bool one = false;  // the rectangle holds one root at most
         bool none = false; // proved: there is no root in the rectangle
+        uint met = 0xfu;   // its quarters that may hold one
         bool near = false;
         for (int step = 0;; ++step) {
             vec2 uv = search.uv;
@@ -505,22 +506,31 @@ void bezier_hit(PatchRay ray, PatchRecord patch, FaceRecord face, LeafBox box, f
                     ++newton_steps;
                     at_end = at_end || splits_in_vain(plane, search.s, bend, share);
                 }
-                if (depth > 0u || !one)
-                    none = passes_by(plane, newton.planes, search.s, search.seen, share, newton.rounding);
+                if (depth > 0u || !one) {
+                    Sight sight = sight_of(plane, newton.planes, search.s, search.seen, share, newton.rounding);
+                    none = passes_by(sight);
+                    for (int quarter = 0; quarter < 4; ++quarter)
+                        if (passes_quarter(sight, quarter))
+                            met &= ~(1u << quarter);
+                }
                 if (none || !(at_end || is_searched(bend)))
                     break;
             }
             NewtonStep next = newton_step(search.seen, uv);
             search.next = next;
-            float from = one ? bend_from(bend, farther(uv - middle, per_side)).bend : around.bend;
+            float off = farther(uv - middle, per_side);
             vec2 moved = next.uv - uv;
-            float turn = from * farther(moved, per_side);
-            search.exact = newton_exact(plane, search.s, next, moved, turn, newton.rounding, newton.enough);
-            search.settled = search.exact || newton_settled(next, turn, near, newton.rounding);
+            float turn = (one ? bend.bend : around.bend) * farther(moved, per_side);
+            float left = one ? bend_left(bend, off) : 1.0f;
+            bool little = turns_little(turn, left);
+            search.exact =
+                newton_exact(plane, search.s, next, moved, turn, left, little, newton.rounding, newton.enough);
+            search.settled = search.exact || newton_settled(next, little, near, newton.rounding);
             near = next.residual <= newton.rounding + next.blur;
             if (search.settled)
                 break;
             if (!next.singular && farther(next.uv - middle, per_side) > 1.0f) {
+                float from = one ? bend_from(bend, off) : around.bend;
                 where = narrowed(where, plane, search.seen, uv, next.uv, from, per_side, newton.rounding);
                 none = is_empty(where);
             }
@@ -554,7 +564,7 @@ void bezier_hit(PatchRay ray, PatchRecord patch, FaceRecord face, LeafBox box, f
             doubtful = true;
             continue;
         }
-        part_count += 4;
+        part_count += bitCount(met);
         if (part_count > kMostParts) {
             spent = true;
             doubtful = true;
@@ -564,7 +574,8 @@ void bezier_hit(PatchRay ray, PatchRecord patch, FaceRecord face, LeafBox box, f
             continue;
         }
         for (uint quarter = 4u; quarter > 0u; --quarter)
-            stack[waiting++] = quarter_of(part, quarter - 1u);
+            if ((met >> (quarter - 1u) & 1u) != 0u)
+                stack[waiting++] = quarter_of(part, quarter - 1u);
     }
     if (doubtful)
         hit.doubt = min(hit.doubt, min(box_past, hit.past)); // it may lie a little before its box, on the next leaf

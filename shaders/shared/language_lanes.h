@@ -286,6 +286,27 @@ FN void store(integer a, uint* p)
 {
     TRIMRAY_EACH_PART hn::StoreU(a.v[i], IntegerTag(), p + i * kPartLanes);
 }
+/// The lanes of `m` beside each other; may write all kLanes values. Returns how many `m` has.
+FN int store_packed(real a, mask m, float* p)
+{
+    int count = 0;
+    TRIMRAY_EACH_PART
+    {
+        hn::StoreU(hn::Compress(a.v[i], m.v[i]), RealTag(), p + count);
+        count += static_cast<int>(hn::CountTrue(RealTag(), m.v[i]));
+    }
+    return count;
+}
+FN int store_packed(integer a, mask m, uint* p)
+{
+    int count = 0;
+    TRIMRAY_EACH_PART
+    {
+        hn::StoreU(hn::Compress(a.v[i], hn::RebindMask(IntegerTag(), m.v[i])), IntegerTag(), p + count);
+        count += static_cast<int>(hn::CountTrue(RealTag(), m.v[i]));
+    }
+    return count;
+}
 /// Lane by lane, its values beside each other.
 FN void store_interleaved(real a, real b, float* p)
 {
@@ -321,6 +342,24 @@ FN integer gather_bytes(const uint* base, integer at)
     return r;
 }
 
+/// Lane i is lane `from` of i of `values`; every lane of `from` must be below kLanes.
+FN real lanes_from(real values, integer from)
+{
+    real r;
+    TRIMRAY_EACH_PART
+    {
+        const auto within = hn::And(from.v[i], hn::Set(IntegerTag(), static_cast<uint>(kPartLanes - 1)));
+        const auto lane = hn::IndicesFromVec(RealTag(), within);
+        r.v[i] = hn::TableLookupLanes(values.v[0], lane);
+        for (int part = 1; part < kParts; ++part) {
+            const auto there =
+                hn::Eq(hn::Sub(from.v[i], within), hn::Set(IntegerTag(), static_cast<uint>(part * kPartLanes)));
+            r.v[i] =
+                hn::IfThenElse(hn::RebindMask(RealTag(), there), hn::TableLookupLanes(values.v[part], lane), r.v[i]);
+        }
+    }
+    return r;
+}
 FN scalar bits_to_scalar(uint bits)
 {
     scalar x;
@@ -441,6 +480,10 @@ FN real length(real2 a)
 FN real3 cross(real3 a, real3 b)
 {
     return real3(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x);
+}
+FN real3 lanes_from(real3 values, integer from)
+{
+    return real3(lanes_from(values.x, from), lanes_from(values.y, from), lanes_from(values.z, from));
 }
 FN real2 select(mask m, real2 a, real2 b)
 {

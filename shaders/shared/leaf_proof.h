@@ -171,24 +171,55 @@ FN mask holds_one(RayBend ray, real off)
     return ray.bend * off + ray.noise < kOneRoot;
 }
 
-// True where all points of a rectangle `share` times the leaf's size around the point `seen` lie on one side of the ray
-// along the picture's direction (m1, m2), a unit vector
-FN mask lies_aside(LeafPlane leaf, RayPlanes ray, SeenPoint seen, real m1, real m2, real share, scalar rounding)
+// Where the points of a rectangle lie along a direction of the picture: off + s u + t v, |s|, |t| <= 1, but for `bend`
+struct Spread {
+    real off;
+    real u;
+    real v;
+    real bend; // and what rounding adds to it
+};
+
+// Of a rectangle `share` times the leaf's size around the point `seen`, along the unit vector (m1, m2)
+FN Spread spread_along(LeafPlane leaf, RayPlanes ray, SeenPoint seen, real m1, real m2, real share, scalar rounding)
 {
-    real off = abs(m1 * seen.r.x + m2 * seen.r.y);
-    real slope = abs(m1 * seen.du.x + m2 * seen.du.y) * (share * leaf.half_side.x) +
-                 abs(m1 * seen.dv.x + m2 * seen.dv.y) * (share * leaf.half_side.y);
     real up = abs(dot(ray.n1 * m1 + ray.n2 * m2, real3(leaf.normal)));
     real level = sqrt(max(1.0f - up * up, real(0.0f)));
     real bend = (0.5f * share * share * leaf.size) * (leaf.along * level + leaf.across * up);
     real lost = share * (leaf.lost.x * leaf.half_side.x + leaf.lost.y * leaf.half_side.y);
-    // twice: for the point, and for a root that a patch's overlap lets in
-    return off > slope + bend + lost + 4.0f * rounding;
+    Spread spread;
+    spread.off = m1 * seen.r.x + m2 * seen.r.y;
+    spread.u = (m1 * seen.du.x + m2 * seen.du.y) * (share * leaf.half_side.x);
+    spread.v = (m1 * seen.dv.x + m2 * seen.dv.y) * (share * leaf.half_side.y);
+    // rounding twice: for the point, and for a root that a patch's overlap lets in
+    spread.bend = bend + lost + 4.0f * rounding;
+    return spread;
 }
 
-// True where the ray passes by the rectangle, whatever its slope: along the surface's normal `s.du` x `s.dv` as the ray
-// sees it, where a rectangle that it grazes is thin, or across it
-FN mask passes_by(LeafPlane leaf, RayPlanes ray, SurfacePoint s, SeenPoint seen, real share, scalar rounding)
+// True where all its points lie on one side of the ray
+FN mask lies_aside(Spread spread)
+{
+    return abs(spread.off) > abs(spread.u) + abs(spread.v) + spread.bend;
+}
+
+// Of the rectangle's quarter towards (to_u, to_v), each 1 or -1
+FN Spread quarter_spread(Spread of, scalar to_u, scalar to_v)
+{
+    Spread spread;
+    spread.u = 0.5f * of.u;
+    spread.v = 0.5f * of.v;
+    spread.off = of.off + to_u * spread.u + to_v * spread.v;
+    spread.bend = of.bend;
+    return spread;
+}
+
+// A rectangle along the surface's normal `s.du` x `s.dv` as the ray sees it, where a rectangle that it grazes is thin,
+// and across it
+struct Sight {
+    Spread along;
+    Spread across;
+};
+
+FN Sight sight_of(LeafPlane leaf, RayPlanes ray, SurfacePoint s, SeenPoint seen, real share, scalar rounding)
 {
     real3 n = cross(s.du, s.dv);
     real n1 = dot(ray.n1, n);
@@ -198,40 +229,68 @@ FN mask passes_by(LeafPlane leaf, RayPlanes ray, SurfacePoint s, SeenPoint seen,
     real per_n = 1.0f / max(long_n, real(1e-20f));
     real m1 = select(seen_across, n1 * per_n, real(1.0f));
     real m2 = select(seen_across, n2 * per_n, real(0.0f));
-    return lies_aside(leaf, ray, seen, m1, m2, share, rounding) ||
-           lies_aside(leaf, ray, seen, -m2, m1, share, rounding);
+    Sight sight;
+    sight.along = spread_along(leaf, ray, seen, m1, m2, share, rounding);
+    sight.across = spread_along(leaf, ray, seen, -m2, m1, share, rounding);
+    return sight;
 }
 
-// The bend around a point that lies `off` half sides from the middle of the rectangle whose bend it is
-FN RayBend bend_from(RayBend ray, real off)
+// True where the ray passes by the rectangle, whatever its slope
+FN mask passes_by(Sight sight)
+{
+    return lies_aside(sight.along) || lies_aside(sight.across);
+}
+
+// And by its quarter of that number: 1 stands for the one towards larger u, 2 for larger v
+FN mask passes_quarter(Sight sight, int quarter)
+{
+    scalar to_u = (quarter & 1) != 0 ? 1.0f : -1.0f;
+    scalar to_v = (quarter & 2) != 0 ? 1.0f : -1.0f;
+    return lies_aside(quarter_spread(sight.along, to_u, to_v)) || lies_aside(quarter_spread(sight.across, to_u, to_v));
+}
+
+// The bend around a point that lies `off` half sides from the middle of a rectangle is the rectangle's over this; 0:
+// there is no bound
+FN real bend_left(RayBend ray, real off)
 {
     real left = 1.0f - (ray.bend * off + ray.noise);
-    real per_left = 1.0f / max(left, real(0.01f));
-    RayBend from;
-    from.bend = select(left > 0.01f, ray.bend * per_left, real(kMostBend));
-    from.noise = select(left > 0.01f, ray.noise * per_left, real(kMostBend));
-    return from;
+    return select(left > 0.01f, left, real(0.0f));
+}
+
+FN real bend_from(RayBend ray, real off)
+{
+    real left = bend_left(ray, off);
+    return select(left > 0.0f, ray.bend / max(left, real(0.01f)), real(kMostBend));
 }
 
 // The normal is that of a last step's beginning: by how much it may be turned, rad (0.0006 degrees)
 const scalar kLastTurn = 1e-5f;
 
-// True where a step begins within rounding of the ray, as `near` says the step before did or where the normal turns no
-// farther: one step more finds the place of the normal, none the root
-FN mask newton_settled(NewtonStep next, real bend, mask near, scalar rounding)
+// Below, turn / left is the bend of a rectangle of the size of a step `moved` around its beginning, which is no less
+// than what the normal turns on the way; left may be 0, turn then only where the step is.
+
+FN mask turns_little(real turn, real left)
 {
-    return next.residual <= rounding + next.blur && (near || bend <= kLastTurn || next.singular);
+    return turn <= kLastTurn * left;
 }
 
-// True where a step `moved` is proved to end within rounding of a root; `bend`: that of a rectangle of its size around
-// its beginning, which is no less than what the normal turns on the way
-FN mask newton_exact(LeafPlane leaf, SurfacePoint s, NewtonStep next, real2 moved, real bend, scalar rounding,
-                     scalar enough)
+// True where a step begins within rounding of the ray, as `near` says the step before did or where the normal turns no
+// farther: one step more finds the place of the normal, none the root
+FN mask newton_settled(NewtonStep next, mask little, mask near, scalar rounding)
+{
+    return next.residual <= rounding + next.blur && (near || little || next.singular);
+}
+
+// True where a step that turns `little` is proved to end within rounding of a root:
+// 2 (turn / left |R moved| + lost) <= rounding
+FN mask newton_exact(LeafPlane leaf, SurfacePoint s, NewtonStep next, real2 moved, real turn, real left, mask little,
+                     scalar rounding, scalar enough)
 {
     real3 way = s.du * moved.x + s.dv * moved.y;
     real lost = leaf.lost.x * abs(moved.x) + leaf.lost.y * abs(moved.y);
-    return !next.singular && next.residual <= enough && bend <= kLastTurn &&
-           2.0f * (bend * length(way) + lost) <= rounding;
+    real room = (0.5f * rounding - lost) * left;
+    return !next.singular && next.residual <= enough && little && room >= 0.0f &&
+           turn * turn * dot(way, way) <= room * room;
 }
 
 // True where rounding moves a root `uv` across a side of the patch by more than the patch's overlap lets in
@@ -259,9 +318,10 @@ FN mask is_beside_side(real2 uv, real2 blur, scalar2 slack)
 
 // True where a point moved by `off` moves a root along its ray by more than a depth may be off: off / sin b, b the
 // ray's slope
-FN mask is_depth_unsure(SurfacePoint s, SeenPoint seen, real off, real footprint)
+FN mask is_depth_unsure(SurfacePoint s, real3 direction, real off, real footprint)
 {
-    return off * length(cross(s.du, s.dv)) > kDepthPx * footprint * abs(seen.det);
+    real3 n = cross(s.du, s.dv);
+    return off * length(n) * length(direction) > kDepthPx * footprint * abs(dot(n, direction));
 }
 
 // Where a ray's roots in a rectangle may lie, uv_patch; empty where hi < lo
