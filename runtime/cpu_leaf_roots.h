@@ -216,19 +216,44 @@ struct Parts {
     real2 middle;
 };
 
+struct PartsInMemory {
+    alignas(64) uint ray[kLanes], depth[kLanes];
+    alignas(64) float u[kLanes], v[kLanes];
+};
+
+FN PartsInMemory in_memory(const Parts& parts)
+{
+    PartsInMemory to;
+    store(parts.ray, to.ray);
+    store(parts.depth, to.depth);
+    store(parts.middle.x, to.u);
+    store(parts.middle.y, to.v);
+    return to;
+}
+
 /// Parts that wait.
 class WaitingParts {
 public:
     int count() const { return count_; }
 
+    void push(uint ray, uint depth, float u, float v)
+    {
+        assert(count_ < kMost && "a ray has kMostParts, and 16 that are not split");
+        ray_[count_] = ray;
+        depth_[count_] = depth;
+        u_[count_] = u;
+        v_[count_] = v;
+        ++count_;
+    }
+
     /// Those of `lanes`.
     HWY_ATTR void push(const Parts& parts, mask lanes)
     {
-        assert(count_ + lane_count(lanes) <= kMost && "a ray has kMostParts, and 16 that are not split");
-        store_packed(parts.ray, lanes, ray_ + count_);
-        store_packed(parts.depth, lanes, depth_ + count_);
-        store_packed(parts.middle.x, lanes, u_ + count_);
-        count_ += store_packed(parts.middle.y, lanes, v_ + count_);
+        const PartsInMemory from = in_memory(parts);
+        for (uint bits = lane_bits(lanes); bits != 0; bits &= bits - 1) {
+            const int i = __builtin_ctz(bits);
+            push(from.ray[i], from.depth[i], from.u[i], from.v[i]);
+        }
     }
 
     /// The last ones; the lanes without one get the bits of another.
@@ -271,46 +296,40 @@ public:
     /// Puts the quarters that rays do not pass by to those waiting, of the parts `lanes` with these half sides.
     HWY_ATTR void split(const Parts& parts, const Sight& sight, real2 half_side, mask lanes)
     {
-        mask met[4];
-        uint met_by[4], any = 0;
-        for (int quarter = 0; quarter < 4; ++quarter) {
-            met[quarter] = lanes && !passes_quarter(sight, quarter);
-            any |= met_by[quarter] = lane_bits(met[quarter]);
-        }
+        uint met[4], any = 0;
+        for (int quarter = 0; quarter < 4; ++quarter)
+            any |= met[quarter] = lane_bits(lanes && !passes_quarter(sight, quarter));
         if (any == 0)
             return;
-        alignas(64) uint ray[kLanes];
-        store(parts.ray, ray);
-        const uint before = spent_;
+        const PartsInMemory of = in_memory(parts);
+        alignas(64) float half_u[kLanes], half_v[kLanes];
+        store(0.5f * half_side.x, half_u);
+        store(0.5f * half_side.y, half_v);
         for (; any != 0; any &= any - 1) {
             const int i = __builtin_ctz(any);
-            for (const uint by : met_by)
-                left_[ray[i]] -= int(by >> i & 1u);
-            spent_ |= uint(left_[ray[i]] < 0) << ray[i];
+            const uint ray = of.ray[i];
+            if ((spent_ >> ray & 1) != 0)
+                continue;
+            for (const uint by : met)
+                left_[ray] -= int(by >> i & 1);
+            if (left_[ray] < 0) {
+                push_sixteenths(ray);
+                continue;
+            }
+            for (int quarter = 0; quarter < 4; ++quarter)
+                if ((met[quarter] >> i & 1) != 0)
+                    waiting_.push(ray, of.depth[i] + 1, of.u[i] + (quarter & 1 ? half_u[i] : -half_u[i]),
+                                  of.v[i] + (quarter & 2 ? half_v[i] : -half_v[i]));
         }
-        const mask goes_on = !is_spent(parts);
-        for (int quarter = 0; quarter < 4; ++quarter) {
-            Parts of = parts;
-            of.depth = parts.depth + integer(1u);
-            const real u = 0.5f * half_side.x, v = 0.5f * half_side.y;
-            of.middle = real2(quarter & 1 ? parts.middle.x + u : parts.middle.x - u,
-                              quarter & 2 ? parts.middle.y + v : parts.middle.y - v);
-            waiting_.push(of, met[quarter] && goes_on);
-        }
-        for (uint bits = spent_ & ~before; bits != 0; bits &= bits - 1)
-            push_sixteenths(uint(__builtin_ctz(bits)));
     }
 
 private:
-    HWY_ATTR void push_sixteenths(uint ray)
+    void push_sixteenths(uint ray)
     {
-        const integer i = lane_numbers(), column = i & integer(3u), row = i >> integer(2u);
-        const auto at = [](scalar middle, scalar half_side, integer k)
-                            HWY_ATTR { return middle + half_side * (0.5f * to_real(k) - 0.75f); };
-        const Parts parts{
-            mask(true), integer(ray), integer(2u),
-            real2(at(leaf_.middle.x, leaf_.half_side.x, column), at(leaf_.middle.y, leaf_.half_side.y, row))};
-        waiting_.push(parts, parts.lanes);
+        spent_ |= 1u << ray;
+        for (int i = 0; i < 16; ++i)
+            waiting_.push(ray, 2, leaf_.middle.x + leaf_.half_side.x * (0.5f * float(i & 3) - 0.75f),
+                          leaf_.middle.y + leaf_.half_side.y * (0.5f * float(i >> 2) - 0.75f));
     }
 
     const LeafPlane& leaf_;
@@ -349,17 +368,19 @@ FN_LARGE uint list_roots(const NewtonPatch& newton, const LeafPlane& leaf, const
         rectangle.per_side = real2(per_side.x * per_share, per_side.y * per_share);
         const SurfacePoint s = newton.at(rectangle.middle);
         const SeenPoint seen = seen_point(s, planes);
-        const Sight of_part = sight_of(leaf, planes, s, seen, rectangle.share, newton.rounding);
         rectangle.bend = bend_around(leaf, planes, seen, rectangle.share);
         rectangle.last = part.depth == integer(uint(kDeepestSplit)) || splitter.is_spent(part) ||
                          splits_in_vain(leaf, s, rectangle.bend, rectangle.share);
+        const auto split = [&](const Sight& of_part, mask lanes)
+                               HWY_ATTR { splitter.split(part, of_part, rectangle.half_side, lanes); };
         mask unknown = part.lanes;
         if (!search) {
             steps += lane_count(part.lanes);
+            const Sight of_part = sight_of(leaf, planes, s, seen, rectangle.share, newton.rounding);
             unknown = unknown && !passes_by(of_part);
             const mask searched = unknown && (is_searched(rectangle.bend) || rectangle.last);
             unsearched.push(part, searched);
-            unknown = unknown && !searched;
+            split(of_part, unknown && !searched);
         } else {
             const Search found = find_root(newton, leaf, rectangle, planes, s, seen, unknown, steps);
             unknown = unknown && !found.complete;
@@ -371,8 +392,10 @@ FN_LARGE uint list_roots(const NewtonPatch& newton, const LeafPlane& leaf, const
             const mask unsure = part.lanes && (found.blurred || is_unsure(found, root, direction));
             for (uint bits = lane_bits(unsure || (unknown && rectangle.last)); bits != 0; bits &= bits - 1)
                 doubtful |= 1u << ray[__builtin_ctz(bits)];
+            unknown = unknown && !rectangle.last;
+            if (any_lane(unknown))
+                split(sight_of(leaf, planes, s, seen, rectangle.share, newton.rounding), unknown);
         }
-        splitter.split(part, of_part, rectangle.half_side, unknown && !rectangle.last);
     }
     return doubtful | splitter.spent();
 }

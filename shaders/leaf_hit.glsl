@@ -512,6 +512,7 @@ void bezier_hit(PatchRay ray, PatchRecord patch, FaceRecord face, LeafBox box, f
                     for (int quarter = 0; quarter < 4; ++quarter)
                         if (passes_quarter(sight, quarter))
                             met &= ~(1u << quarter);
+                    iterations += 4u;
                 }
                 if (none || !(at_end || is_searched(bend)))
                     break;

@@ -286,27 +286,6 @@ FN void store(integer a, uint* p)
 {
     TRIMRAY_EACH_PART hn::StoreU(a.v[i], IntegerTag(), p + i * kPartLanes);
 }
-/// The lanes of `m` beside each other; may write all kLanes values. Returns how many `m` has.
-FN int store_packed(real a, mask m, float* p)
-{
-    int count = 0;
-    TRIMRAY_EACH_PART
-    {
-        hn::StoreU(hn::Compress(a.v[i], m.v[i]), RealTag(), p + count);
-        count += static_cast<int>(hn::CountTrue(RealTag(), m.v[i]));
-    }
-    return count;
-}
-FN int store_packed(integer a, mask m, uint* p)
-{
-    int count = 0;
-    TRIMRAY_EACH_PART
-    {
-        hn::StoreU(hn::Compress(a.v[i], hn::RebindMask(IntegerTag(), m.v[i])), IntegerTag(), p + count);
-        count += static_cast<int>(hn::CountTrue(RealTag(), m.v[i]));
-    }
-    return count;
-}
 /// Lane by lane, its values beside each other.
 FN void store_interleaved(real a, real b, float* p)
 {
@@ -360,6 +339,7 @@ FN real lanes_from(real values, integer from)
     }
     return r;
 }
+
 FN scalar bits_to_scalar(uint bits)
 {
     scalar x;

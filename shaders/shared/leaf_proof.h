@@ -201,7 +201,7 @@ FN mask lies_aside(Spread spread)
     return abs(spread.off) > abs(spread.u) + abs(spread.v) + spread.bend;
 }
 
-// Of the rectangle's quarter towards (to_u, to_v), each 1 or -1
+// Of the rectangle's quarter, whose points are no others, towards (to_u, to_v), each 1 or -1
 FN Spread quarter_spread(Spread of, scalar to_u, scalar to_v)
 {
     Spread spread;
@@ -249,8 +249,8 @@ FN mask passes_quarter(Sight sight, int quarter)
     return lies_aside(quarter_spread(sight.along, to_u, to_v)) || lies_aside(quarter_spread(sight.across, to_u, to_v));
 }
 
-// The bend around a point that lies `off` half sides from the middle of a rectangle is the rectangle's over this; 0:
-// there is no bound
+// The bend around a point that lies `off` half sides from a rectangle's middle is the rectangle's divided by this;
+// where it is 0 there is no bound
 FN real bend_left(RayBend ray, real off)
 {
     real left = 1.0f - (ray.bend * off + ray.noise);
@@ -266,9 +266,8 @@ FN real bend_from(RayBend ray, real off)
 // The normal is that of a last step's beginning: by how much it may be turned, rad (0.0006 degrees)
 const scalar kLastTurn = 1e-5f;
 
-// Below, turn / left is the bend of a rectangle of the size of a step `moved` around its beginning, which is no less
-// than what the normal turns on the way; left may be 0, turn then only where the step is.
-
+// turn / left: the bend of a rectangle of the size of a step around its beginning, no less than what the normal turns
+// on the way. Where left is 0 only a step of no length turns little.
 FN mask turns_little(real turn, real left)
 {
     return turn <= kLastTurn * left;
@@ -281,8 +280,8 @@ FN mask newton_settled(NewtonStep next, mask little, mask near, scalar rounding)
     return next.residual <= rounding + next.blur && (near || little || next.singular);
 }
 
-// True where a step that turns `little` is proved to end within rounding of a root:
-// 2 (turn / left |R moved| + lost) <= rounding
+// True where a step `moved` that turns `little` is proved to end within rounding of a root:
+// 2 (turn / left |R moved| + lost) <= rounding, without the division and the root
 FN mask newton_exact(LeafPlane leaf, SurfacePoint s, NewtonStep next, real2 moved, real turn, real left, mask little,
                      scalar rounding, scalar enough)
 {
