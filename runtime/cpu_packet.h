@@ -314,8 +314,9 @@ private:
             const Search search = find_root(newton, leaf, whole, planes, middle, seen, searched, work_.newton_steps);
             open = open || (searched && !search.complete);
             const Root root = end_of(newton, search, origin, direction);
-            doubtful = searched && (search.blurred || is_unsure(target, newton, search, root, direction));
-            const mask near = root.found && in_range(target, root.t, hit);
+            const mask ahead = in_range(target, root.t, hit);
+            doubtful = searched && (search.blurred || is_unsure(target, newton, search, root, direction, ahead));
+            const mask near = root.found && ahead;
             if (any_lane(near))
                 offer(target, near, root.t, root.uv, root.normal, hit);
         }
@@ -343,14 +344,14 @@ private:
                 patch_slack(scalar2(patch.uv_scale[0], patch.uv_scale[1]))};
     }
 
-    /// Roots before the eye of which rounding decides more than a certificate leaves open: how far they are, or whether
-    /// the face holds them.
+    /// Roots of which rounding decides more than a certificate leaves open: how far they are, or whether the face holds
+    /// them. Of the lanes `asked`.
     HWY_ATTR HWY_INLINE mask is_unsure(const Target& target, const NewtonPatch& newton, const Search& search,
-                                       const Root& root, real3 direction)
+                                       const Root& root, real3 direction, mask asked)
     {
         const real footprint = target.view.pixel * (target.view.tau + root.t);
         const real off = more_than_hair(footprint, newton.rounding);
-        const mask asked = search.settled && off > 0.0f && footprint > 0.0f;
+        asked = asked && search.settled && off > 0.0f && footprint > 0.0f;
         if (!any_lane(asked))
             return asked;
         const real more = off * (1.0f / newton.rounding);
@@ -370,11 +371,18 @@ private:
         mask beside = asked && is_beside_side(uv, uv_blur, scalar2(kDomainSlack, kDomainSlack));
         if ((target.face.flags & kFaceNaturalBorder) != 0)
             return beside;
-        const mask inside = inside_loops(target, clamp_to_domain(uv), asked);
-        for (int corner = 0; corner < kCornerCount; ++corner) {
-            const mask moved = inside_loops(target, clamp_to_domain(corner_around(uv, uv_blur, corner)), asked);
-            beside = beside || (asked && differ(moved, inside));
-        }
+        const mask open = asked && !beside && !lies_clear(source_, target.face, uv, uv_blur, asked);
+        if (!any_lane(open))
+            return beside;
+        // by the cells, where there are some, whatever hits are held against
+        const auto inside = [&](real2 at) HWY_ATTR {
+            return target.face.grid == 0 ? inside_loops(target, clamp_to_domain(at), open)
+                                         : inside_trims(source_, TrimMode::Exact, patch.face, target.face,
+                                                        clamp_to_domain(at), open, work_.curve_tests);
+        };
+        const mask here = inside(uv);
+        for (int corner = 0; corner < kCornerCount; ++corner)
+            beside = beside || (open && differ(inside(corner_around(uv, uv_blur, corner)), here));
         return beside;
     }
 
@@ -428,7 +436,7 @@ private:
         const uint doubtful = list_roots(
             newton, leaf, rays, sight, open,
             [&](const Search& search, const Root& root, real3 along)
-                HWY_ATTR { return is_unsure(target, newton, search, root, along); },
+                HWY_ATTR { return is_unsure(target, newton, search, root, along, mask(true)); },
             roots, work_.newton_steps);
         const int most = *std::max_element(roots.count, roots.count + kLanes);
         for (int i = 0; i < most; ++i) {
@@ -443,11 +451,6 @@ private:
                       real3(load(roots.nx[i]), load(roots.ny[i]), load(roots.nz[i])), hit);
         }
         return lanes_of(doubtful);
-    }
-
-    HWY_ATTR static real2 clamp_to_domain(real2 uv)
-    {
-        return real2(clamp(uv.x, real(0.0f), real(kUvBelowOne)), clamp(uv.y, real(0.0f), real(kUvBelowOne)));
     }
 
     /// But for the torus' second angle, which is unwrapped.

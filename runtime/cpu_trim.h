@@ -51,6 +51,33 @@ FN mask inside_by_cells(const FetchSource& source, const TrimFace& trim, real2 u
     return inside;
 }
 
+FN real2 clamp_to_domain(real2 uv)
+{
+    return real2(clamp(uv.x, real(0.0f), real(kUvBelowOne)), clamp(uv.y, real(0.0f), real(kUvBelowOne)));
+}
+
+/// Lanes of `asked` for which the rectangle around uv with half sides `width` holds no trim: it lies in one cell and
+/// meets no box of a piece that passes through. None where a face has no cells.
+FN_LARGE mask lies_clear(const FetchSource& source, const FaceRecord& face, real2 uv, real2 width, mask asked)
+{
+    if (face.grid == 0)
+        return mask(false);
+    const TrimFace trim = trim_face(face);
+    const real2 lo = clamp_to_domain(uv - width), hi = clamp_to_domain(uv + width);
+    const real2 from(select(asked, lo.x, real(0.0f)), select(asked, lo.y, real(0.0f)));
+    const mask in_one = asked && cell_index(trim, from) == cell_index(trim, hi);
+    mask met(false);
+    inside_by_cells(source, trim, from, in_one, [&](uint cell, mask here) HWY_ATTR {
+        for (uint at = cell_first_entry(trim, cell);; ++at) {
+            const uint entry = fetch_entry_word(FETCH_PASS at);
+            met = met || (here && meets_piece_box(FETCH_PASS trim, entry, lo, hi));
+            if (entry_is_last(entry))
+                return mask(false);
+        }
+    });
+    return in_one && !met;
+}
+
 FN mask inside_exact(const FetchSource& source, const FaceRecord& face, real2 uv, mask asked, uint64_t& curve_tests)
 {
     const TrimFace trim = trim_face(face);

@@ -159,13 +159,39 @@ vec3 outward(PatchRecord patch, FaceRecord face, vec3 n)
     return left_handed != reversed ? -n : n;
 }
 
+// Whether the rectangle around uv with half sides `width` holds no trim: it lies in one cell and meets no box of a piece
+// that passes through
+bool lies_clear(FaceRecord face, vec2 uv, vec2 width)
+{
+    if (!has_feature(kFeatureTrims) || (face.flags & kFaceNaturalBorder) != 0u)
+        return true;
+    if ((trim_mode != kTrimByCells && trim_mode != kTrimByBoth) || face.grid == 0u)
+        return false;
+    TrimFace trim = trim_face(face);
+    vec2 lo = clamp(uv - width, vec2(0.0f), vec2(kUvBelowOne));
+    vec2 hi = clamp(uv + width, vec2(0.0f), vec2(kUvBelowOne));
+    uint cell = cell_index(trim, lo);
+    if (cell != cell_index(trim, hi))
+        return false;
+    uint word = fetch_cell(cell);
+    for (uint at = cell_first_entry(trim, word); cell_is_mixed(word); ++at) {
+        uint entry = cell_entries[at].word;
+        if (meets_piece_box(trim, entry, lo, hi))
+            return false;
+        ++iterations;
+        if (entry_is_last(entry) || (iteration_limit > 0u && iterations > kRoundIterations))
+            break;
+    }
+    return true;
+}
+
 // Whether a point is inside the face's trims and, if asked, beside its rim (shaders/shared/rim.h). `unsure`: it may be
 // on the other side of a trim, for rounding may have moved it by `blur`; 0 where that is too little to matter.
 bool inside_face(uint face_id, FaceRecord face, vec2 uv, bool beside_rim, vec2 blur, out bool unsure)
 {
     unsure = false;
     bool inside = true;
-    int blurred = blur.x > 0.0f ? kCornerCount : 0;
+    int blurred = blur.x > 0.0f && !lies_clear(face, uv, blur) ? kCornerCount : 0;
     int count = 1 + blurred + (beside_rim ? kCornerCount : 0);
     for (int i = 0; i < count; ++i) {
         bool of_rim = i > blurred;

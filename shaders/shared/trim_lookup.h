@@ -101,6 +101,15 @@ FN_LARGE mask left_of_cubic(scalar2 a, scalar2 b, scalar2 c, scalar2 d, real2 uv
     return left;
 }
 
+// Does the rectangle [lo, hi] meet the box of this entry's piece?
+FN mask meets_piece_box(FETCH_PARAM TrimFace face, uint word, real2 lo, real2 hi)
+{
+    uint first = face.first_point + (word >> kPiecePointShift);
+    scalar2 a = fetch_trim_point(FETCH_PASS first);
+    scalar2 b = fetch_trim_point(FETCH_PASS first + ((word & kPieceCubic) != 0u ? 3u : 1u));
+    return lo.x <= max(a.x, b.x) && hi.x >= min(a.x, b.x) && lo.y <= max(a.y, b.y) && hi.y >= min(a.y, b.y);
+}
+
 // Does the path from uv to the cell's reference corner cross the piece of this entry an odd number of times?
 // Answers the lanes `asked`.
 FN mask entry_crossed(FETCH_PARAM TrimFace face, uint word, scalar eta, real2 uv, mask asked)
