@@ -26,6 +26,7 @@ struct NewtonPatch {
     scalar enough;   // residual of the last step, patch units
     scalar rounding; // residual that rounding alone may leave, patch units
     scalar2 slack;   // kDomainSlack in uv_patch
+    bool rational;
 
     HWY_ATTR SurfacePoint at(real2 uv) const { return evaluate(source, first_control_point, degree_u, degree_v, uv); }
 };
@@ -124,7 +125,8 @@ FN_LARGE Search find_root(const NewtonPatch& newton, const LeafPlane& leaf, cons
 }
 
 struct Root {
-    mask found; // it lies on the patch
+    mask found;    // it lies on the patch
+    mask doubtful; // or may not
     real2 uv;
     real t;
     real3 normal;
@@ -162,6 +164,8 @@ FN_LARGE Root end_of(const NewtonPatch& newton, const Search& search, real3 orig
     end.t = root.t;
     end.found =
         search.settled && abs(root.uv.x - 0.5f) <= 0.5f + overlap.x && abs(root.uv.y - 0.5f) <= 0.5f + overlap.y;
+    // where weights may not stay positive beyond a side, it is not certain that the patch goes on
+    end.doubtful = search.blurred || (mask(newton.rational) && end.found && is_beyond_sides(root.uv));
     end.normal = patch_normal(newton, search.s, search.uv, end.found);
     return end;
 }
@@ -389,7 +393,7 @@ FN_LARGE uint list_roots(const NewtonPatch& newton, const LeafPlane& leaf, const
             store(part.ray, ray);
             const Root root = end_of(newton, found, origin, direction);
             doubtful |= list(root, ray, roots);
-            const mask unsure = part.lanes && (found.blurred || is_unsure(found, root, direction));
+            const mask unsure = part.lanes && (root.doubtful || is_unsure(found, root, direction));
             for (uint bits = lane_bits(unsure || (unknown && rectangle.last)); bits != 0; bits &= bits - 1)
                 doubtful |= 1u << ray[__builtin_ctz(bits)];
             unknown = unknown && !rectangle.last;

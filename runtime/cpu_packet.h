@@ -315,7 +315,7 @@ private:
             open = open || (searched && !search.complete);
             const Root root = end_of(newton, search, origin, direction);
             const mask ahead = in_range(target, root.t, hit);
-            doubtful = searched && (search.blurred || is_unsure(target, newton, search, root, direction, ahead));
+            doubtful = searched && (root.doubtful || is_unsure(target, newton, search, root, direction, ahead));
             const mask near = root.found && ahead;
             if (any_lane(near))
                 offer(target, near, root.t, root.uv, root.normal, hit);
@@ -341,7 +341,8 @@ private:
                 find_evaluate(patch.shape),
                 last_residual(job_.error_px * target.view.pixel * std::abs(target.view.tau)),
                 patch_rounding(degree_u, degree_v),
-                patch_slack(scalar2(patch.uv_scale[0], patch.uv_scale[1]))};
+                patch_slack(scalar2(patch.uv_scale[0], patch.uv_scale[1])),
+                (patch.shape & kShapeRational) != 0};
     }
 
     /// Roots of which rounding decides more than a certificate leaves open: how far they are, or whether the face holds

@@ -408,6 +408,9 @@ void offer_end(PatchRay ray, PatchRecord patch, FaceRecord face, NewtonPatch new
     vec2 uv_blur = vec2(0.0f);
     float footprint = ray.pixel * (ray.anchor + root.t);
     float off_by = more_than_hair(footprint, newton.rounding);
+    // where weights may not stay positive beyond a side, it is not certain that the patch goes on
+    if (on_patch && newton.rational && is_beyond_sides(root.uv))
+        hit.doubt = min(hit.doubt, ray.past + root.t - as_near(ray, hit) - blur);
     if (off_by > 0.0f) {
         vec2 patch_blur = root_blur(search.seen, off_by);
         uv_blur = patch_blur * abs(vec2(patch.uv_scale[0], patch.uv_scale[1]));

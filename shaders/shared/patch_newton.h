@@ -132,6 +132,12 @@ FN real2 patch_overlap(real2 blur, scalar2 slack)
                  min(max(blur.y, real(slack.y)), real(kNewtonOutside)));
 }
 
+// True where a root lies beyond a side of its patch
+FN mask is_beyond_sides(real2 uv)
+{
+    return abs(uv.x - 0.5f) > 0.5f || abs(uv.y - 0.5f) > 0.5f;
+}
+
 // A root and its distance along the ray
 struct NewtonRoot {
     real2 uv;
