@@ -25,7 +25,7 @@ struct NewtonPatch {
     Evaluate evaluate;
     scalar enough;   // residual of the last step, patch units
     scalar rounding; // residual that rounding alone may leave, patch units
-    scalar2 slack;   // kDomainSlack in uv_patch
+    scalar2 slack;   // patch_slack
     bool rational;
 
     HWY_ATTR SurfacePoint at(real2 uv) const { return evaluate(source, first_control_point, degree_u, degree_v, uv); }

@@ -409,15 +409,16 @@ void offer_end(PatchRay ray, PatchRecord patch, FaceRecord face, NewtonPatch new
     float footprint = ray.pixel * (ray.anchor + root.t);
     float off_by = more_than_hair(footprint, newton.rounding);
     // where weights may not stay positive beyond a side, it is not certain that the patch goes on
-    if (on_patch && newton.rational && is_beyond_sides(root.uv))
-        hit.doubt = min(hit.doubt, ray.past + root.t - as_near(ray, hit) - blur);
+    bool unsure = on_patch && newton.rational && is_beyond_sides(root.uv);
     if (off_by > 0.0f) {
         vec2 patch_blur = root_blur(search.seen, off_by);
         uv_blur = patch_blur * abs(vec2(patch.uv_scale[0], patch.uv_scale[1]));
-        if (is_beside_side(root.uv, patch_blur, slack) || is_beside_side(uv_face, uv_blur, vec2(kDomainSlack)) ||
-            (on_patch && is_depth_unsure(search.s, ray.direction, off_by, footprint)))
-            hit.doubt = min(hit.doubt, ray.past + root.t - as_near(ray, hit) - blur);
+        unsure = unsure || is_beside_side(root.uv, patch_blur, slack) ||
+                 is_beside_side(uv_face, uv_blur, vec2(kDomainSlack)) ||
+                 (on_patch && is_depth_unsure(search.s, ray.direction, off_by, footprint));
     }
+    if (unsure)
+        hit.doubt = min(hit.doubt, ray.past + root.t - as_near(ray, hit) - blur);
     if (!on_patch)
         return;
     bool back = false;
