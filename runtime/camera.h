@@ -1,5 +1,5 @@
-// Pinhole camera. Pixel centres at +0.5, row 0 at the top, vertical field of view, millimetres, right-handed, z up by
-// default.
+// Pinhole or orthographic camera. Pixel centres at +0.5, row 0 at the top, vertical field of view, millimetres,
+// right-handed, z up by default.
 #pragma once
 
 #include <array>
@@ -11,7 +11,8 @@ namespace trimray {
 
 struct Camera {
     std::array<double, 3> eye{0, 0, 0}, target{0, 0, -1}, up{0, 0, 1};
-    double fov_deg = 35; // vertical
+    double fov_deg = 35;        // vertical
+    double orthographic_mm = 0; // height of what is seen, rays all parallel to target - eye; 0: perspective
 };
 
 /// The camera's ray through pixel coordinates (x, y) is eye + t * normalize(corner + x * step_x + y * step_y), t in mm.

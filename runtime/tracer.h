@@ -4,6 +4,7 @@
 #include "format/pack_reader.h"
 #include "format/result.h"
 #include "runtime/camera.h"
+#include "runtime/scene_look.h"
 
 #include <array>
 #include <cstdint>
@@ -84,6 +85,8 @@ struct RenderOptions {
     // linear light; none: nearly black on light faces, light on dark ones
     std::optional<std::array<float, 3>> edge_color;
     bool antialias_trims = false; // borders and rims of faces blended with what is beside them, from one sample a pixel
+
+    SceneLook look; // lights, materials, shadows, sections, maps
 };
 
 /// Per-pixel results, row 0 at the top. A miss has depth +inf, face -1, zeros elsewhere.

@@ -1,0 +1,95 @@
+// What a scene asks for beside its pack: lights, materials, effects, maps drawn on surfaces, sections. Lengths are mm
+// in the world, angles degrees, colours linear light. All defaults ask for nothing: the picture is the pack's own
+// colours under one light at the eye (shaders/shared/shading.h).
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace trimray {
+
+enum class LightKind {
+    Directional, // from infinitely far, along `direction`
+    Point,       // from `position_mm`, equally strong at every distance: what is lit does not depend on the unit
+};
+struct Light {
+    LightKind kind = LightKind::Directional;
+    std::array<double, 3> direction{0, 0, -1}; // the way light goes; any length but 0
+    std::array<double, 3> position_mm{};
+    std::array<float, 3> color{1, 1, 1}; // linear, times the light's strength
+    // Half the angle that the light is seen under (Directional), or its radius (Point): 0 has sharp shadows
+    double half_angle_deg = 0, radius_mm = 0;
+    bool shadows = false;
+};
+
+/// What a face is made of. Fields that are not set leave what a rule before, or the pack, says.
+struct Material {
+    std::optional<std::array<float, 3>> color;
+    std::optional<float> opacity;  // [0, 1]
+    std::optional<float> mirror;   // share of light that is reflected as by a mirror, [0, 1]
+    std::optional<float> specular; // strength of highlights, [0, 1]; kSpecular where nothing says
+};
+
+/// Gives `material` to all faces that meet every condition that is set; later rules win, field by field.
+struct MaterialRule {
+    std::optional<std::string> part;    // a part's or a placement's name, or "#N", its number in the pack
+    std::vector<uint32_t> faces;        // numbers as `info` and the EXR's `face` have them; empty: all
+    std::optional<uint32_t> pack_color; // 0xRRGGBB, sRGB: what the pack paints them with
+    Material material;
+};
+
+/// What is drawn on surfaces in place of their colours, from exact derivatives.
+enum class SurfaceMap {
+    None,
+    Zebra,     // stripes of a striped tube of light seen in the surface as in a mirror: breaks show G1, kinks G2
+    Isophotes, // bands of equal angle to a direction
+    CurvatureGaussian, // k1 k2, 1/mm^2
+    CurvatureMean,     // (k1 + k2) / 2, 1/mm, positive where the surface is convex seen from outside
+    CurvatureMax,      // the larger of k1 and k2, 1/mm
+    CurvatureMin,      // the smaller
+    Draft,             // angle between the surface and the pull direction, 90 deg - angle(normal, pull)
+};
+struct SurfaceMapLook {
+    SurfaceMap map = SurfaceMap::None;
+    uint32_t stripes = 16;                    // zebra and isophotes: pairs of bands over half a turn
+    std::array<double, 3> direction{0, 0, 1}; // zebra: the stripes' axis; isophotes: the light; draft: the pull
+    std::optional<std::array<double, 2>>
+        range;            // curvatures: the values of the scale's ends; none: from the pack's size
+    double draft_deg = 3; // draft: faces steeper than this are in order
+};
+
+enum class CapStyle { None, Filled, Hatched };
+/// What lies on the side that `normal` points to is cut away. With several planes only what none cuts away stays.
+struct SectionPlane {
+    std::array<double, 3> point_mm{};
+    std::array<double, 3> normal{0, 0, 1}; // any length but 0
+};
+struct SectionLook {
+    std::vector<SectionPlane> planes;
+    CapStyle caps = CapStyle::Filled;
+    std::optional<std::array<float, 3>> cap_color; // none: each part's own
+};
+constexpr size_t kMostSectionPlanes = 6;
+
+struct Occlusion {
+    uint32_t samples = 0;                                      // rays a pixel; 0: none
+    double reach_mm = std::numeric_limits<double>::infinity(); // what is farther hides nothing
+};
+
+struct SceneLook {
+    std::vector<Light> lights;   // none: the light at the eye
+    uint32_t light_samples = 16; // rays a pixel to each light that is not a point or a direction alone
+    Occlusion occlusion;
+    uint32_t mirror_depth = 1; // reflections of reflections that are followed
+    std::vector<MaterialRule> materials;
+    std::optional<float> xray; // opacity of every surface that no rule gives one: all of them show through
+    SurfaceMapLook map;
+    SectionLook section;
+};
+
+} // namespace trimray
