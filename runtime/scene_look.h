@@ -81,7 +81,18 @@ struct Occlusion {
     double reach_mm = std::numeric_limits<double>::infinity(); // what is farther hides nothing
 };
 
+/// A picture all around, equirectangular: the row's middle looks along +x, its right half turns to -y, the top row is
+/// +z.
+struct Environment {
+    uint32_t width = 0, height = 0;
+    std::vector<float> rgb; // 3 a pixel, linear light, row 0 at the top
+    std::string name;       // of the file, for messages
+};
+
 struct SceneLook {
+    // What rays that meet nothing see: an environment, else a colour, else nothing (alpha 0; black in mirrors)
+    std::optional<std::array<float, 3>> background;
+    std::shared_ptr<const Environment> environment;
     std::vector<Light> lights;   // none: the light at the eye
     uint32_t light_samples = 16; // rays a pixel to each light that is not a point or a direction alone
     Occlusion occlusion;
