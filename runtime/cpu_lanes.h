@@ -6,6 +6,7 @@
 #include "runtime/cpu_view.h"
 #include "runtime/edge_lines.h"
 #include "runtime/frame_effects.h"
+#include "runtime/light_view.h"
 #include "runtime/stochastic_frames.h"
 #include "runtime/tracer.h"
 
@@ -47,6 +48,13 @@ struct LeafMiddle {
     float values[32];
 };
 
+/// Planes of leaves that rays from elsewhere met, by the leaf's number modulo kCount.
+struct FreeMiddles {
+    static constexpr size_t kCount = 256;
+    std::vector<LeafMiddle> middle;
+    std::vector<uint32_t> leaf; // whose; ~0: none
+};
+
 /// What a block's tracing reads and writes; one a thread, reused.
 struct BlockScratch {
     CandidateScratch walk;
@@ -60,6 +68,7 @@ struct BlockScratch {
     std::vector<uint32_t> index;
     Strip strip;
     std::vector<TrimQueries> trim_queries; // of all blocks so far, where the job records them
+    FreeMiddles free_middles;              // where a picture needs such rays
     std::vector<EdgeView> edge_views;
     BlockMarks edge_marks;
 };
@@ -79,6 +88,12 @@ struct StochasticJob {
     KeptHits* kept;             // null: there is one frame alone
 };
 
+/// What lights a picture, where that is more than the light at the eye.
+struct LightJob {
+    FrameLights frame;
+    std::span<const WorldToPart> to_part; // by instance
+};
+
 struct BlockJob {
     const CpuScene& scene;
     const View& view;
@@ -91,6 +106,7 @@ struct BlockJob {
     bool record_trim_queries = false;
     const EdgeJob* edges = nullptr;            // null: nobody asks for borders
     const StochasticJob* stochastic = nullptr; // null: ClosestPolicy::Certified
+    const LightJob* light = nullptr;           // null: the light at the eye alone
 };
 
 /// Traces the block into `frame`, whose arrays have their size.

@@ -20,6 +20,7 @@
 #include "shaders/shared/rim.h"
 #include "shaders/shared/torus.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 
@@ -32,8 +33,30 @@ struct LeafAt {
     uint8_t* has_middle;
 };
 
+/// The last native patches that a packet was tested against: one with several leaves need not be met again.
+class RecentPatches {
+public:
+    void clear() { count_ = 0; }
+    /// Whether the patch is among them; if not, it is from now on.
+    bool has(uint instance, uint patch)
+    {
+        const uint64_t key = uint64_t(instance) << 32 | patch;
+        for (uint i = 0; i < std::min(count_, kKept); ++i)
+            if (keys_[i] == key)
+                return true;
+        keys_[count_++ % kKept] = key;
+        return false;
+    }
+
+private:
+    static constexpr uint kKept = 8;
+    uint64_t keys_[kKept];
+    uint count_ = 0;
+};
+
 /// The pixels' rays from the eye, as one patch has them: `at` is tau - tau_ref in mm.
 struct EyeRays {
+    static constexpr bool kCertifies = true; // what stays open of them is told in PacketHit::doubt
     const PatchView& view;
     mask alive;
     float begin; // `at` of the eye
@@ -228,6 +251,8 @@ private:
     HWY_ATTR HWY_INLINE mask is_unsure(const Target& target, const NewtonPatch& newton, const Search& search,
                                        const Root& root, real3 direction, mask asked)
     {
+        if constexpr (!Rays::kCertifies)
+            return mask(false);
         const real footprint = target.rays.footprint(root.t);
         const real off = more_than_hair(footprint, newton.rounding);
         asked = asked && search.settled && off > 0.0f && footprint > 0.0f;

@@ -13,6 +13,7 @@
 #include "runtime/cpu_fetch.h"
 #include "runtime/cpu_lanes.h"
 #include "runtime/cpu_leaf_hits.h"
+#include "runtime/cpu_light.h"
 #include "runtime/cpu_stochastic.h"
 #include "runtime/cpu_write.h"
 
@@ -20,6 +21,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <optional>
 
 SHARED_OPEN
 
@@ -30,6 +32,8 @@ public:
           source_(fetch_source(job.scene.image, job.kd)), leaf_hits_(job, scratch, source_, work),
           edges_(job, scratch, source_, work)
     {
+        if (job.light)
+            light_.emplace(job, scratch, source_, work);
     }
 
     HWY_ATTR void trace(const Block& block)
@@ -64,7 +68,8 @@ public:
                         PacketHit hit = trace_twice(packet, pixel_rect({x, y, x + 4, y + 4}));
                         if (keeps)
                             keep_nearer(hit, packet.alive, *kept_);
-                        write_packet(job_, packet, hit, x - block.x0, y - strip_y0, scratch_.strip, work_);
+                        write_packet(job_, packet, hit, light_ ? &*light_ : nullptr, x - block.x0, y - strip_y0,
+                                     scratch_.strip, work_);
                         if (has_borders)
                             edges_.find(packet, hit, x, y, &scratch_.strip.rgba[y - strip_y0][4 * (x - block.x0)]);
                     }
@@ -140,7 +145,7 @@ private:
             load_kept(*kept_, packet.alive, hit);
             farthest = largest_lane(hit.best);
         }
-        recent_count_ = 0;
+        recent_.clear();
         for (size_t first = 0; first < tile_count_; first += kLanes) {
             if (scratch_.near_mm[first] > farthest)
                 break;
@@ -162,7 +167,7 @@ private:
     {
         const Candidate& candidate = scratch_.candidates[candidate_index];
         const uint patch_id = image_.leaves[candidate.leaf].patch;
-        if (job_.scene.shared_patch[patch_id] && was_tested(candidate.instance, patch_id))
+        if (job_.scene.shared_patch[patch_id] && recent_.has(candidate.instance, patch_id))
             return false;
         work_.leaf_visits += lane_count(packet.alive);
         if (!scratch_.has_view[candidate_index]) {
@@ -181,17 +186,6 @@ private:
         return leaf_hits_.intersect(rays, at, middle + across * real(view.tau), w0 + across, hit);
     }
 
-    bool was_tested(uint instance, uint patch)
-    {
-        constexpr uint kRecent = 8;
-        const uint64_t key = uint64_t(instance) << 32 | patch;
-        for (uint i = 0; i < std::min(recent_count_, kRecent); ++i)
-            if (recent_[i] == key)
-                return true;
-        recent_[recent_count_++ % kRecent] = key;
-        return false;
-    }
-
     const BlockJob& job_;
     BlockScratch& scratch_;
     Frame& frame_;
@@ -200,9 +194,9 @@ private:
     const FetchSource source_;
     LeafHits<EyeRays> leaf_hits_;
     EdgeFinder edges_;
+    std::optional<PacketLight> light_;
     size_t tile_count_ = 0;
-    uint64_t recent_[8];
-    uint recent_count_ = 0;
+    RecentPatches recent_;
     KeptPacket* kept_ = nullptr; // of the packet at hand, where hits are kept from frame to frame
 };
 

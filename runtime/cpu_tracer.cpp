@@ -2,6 +2,7 @@
 #include "runtime/eye_side.h"
 #include "runtime/frame_effects.h"
 #include "runtime/frame_size.h"
+#include "runtime/light_view.h"
 #include "runtime/thread_clock.h"
 #include "runtime/trace_one.h"
 #include "runtime/tracer.h"
@@ -44,6 +45,10 @@ public:
         if (const Status drawable = check_effects(options); !drawable.ok())
             return drawable.error();
         const bool asks_borders = edge_query(options).any() && has_effects(options);
+        if (const Status lights = check_lights(options.look); !lights.ok())
+            return lights.error();
+        if (options.shade && has_free_rays(options.look) && to_part_.empty())
+            to_part_ = world_to_part(scene_->pack.image);
         if (asks_borders && !border_cells_)
             border_cells_ = make_border_cells(scene_->pack.image);
         if (*trim == TrimMode::Kd && !cpu_scene_->kd_trims().ok())
@@ -97,6 +102,13 @@ private:
         const StochasticJob stochastic{start_of_frame(frame_number), keeps_hits(options) ? &kept_ : nullptr};
         if (options.closest == ClosestPolicy::Stochastic)
             job.stochastic = &stochastic;
+        std::optional<LightJob> light;
+        if (options.shade && has_lights(options.look)) {
+            const ViewRays picture{std::to_array(view.eye_mm), std::to_array(view.w0), std::to_array(view.step_x),
+                                      std::to_array(view.step_y), view.tau_ref};
+            light.emplace(LightJob{frame_lights(scene_->pack.image, options, picture), to_part_});
+            job.light = &*light;
+        }
         const bool effects = has_effects(options);
         std::optional<BlockLineDrawer> drawer;
         std::optional<EdgeJob> edges;
@@ -152,6 +164,7 @@ private:
     tbb::enumerable_thread_specific<BlockScratch> scratch_;
     std::optional<BorderCells> border_cells_; // once a picture asks for borders
     EdgeMap edge_map_;
+    std::vector<WorldToPart> to_part_; // once a picture needs rays from elsewhere than the eye
     KeptHits kept_; // of the picture at hand, where ClosestPolicy::Stochastic makes it in several frames
 };
 

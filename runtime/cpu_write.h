@@ -102,6 +102,15 @@ struct PacketPixels {
     alignas(16) uint8_t certified[kLanes];
 };
 
+/// A packet's hits as lights find them.
+struct LitPoints {
+    real3 normal; // unit, outward
+    real3 to_eye; // unit
+    real3 color;
+    real specular;
+    mask alive;
+};
+
 constexpr PacketPixels missed_pixels(bool certified)
 {
     PacketPixels pixels{};
@@ -161,8 +170,10 @@ HWY_INLINE void copy_to_strip(const PacketPixels& pixels, uint32_t x, uint32_t y
     }
 }
 
-[[maybe_unused]] static HWY_ATTR void write_packet(const BlockJob& job, const Packet& packet, const PacketHit& hit,
-                                                   uint32_t x, uint32_t y, Strip& strip, WorkCounts& work)
+/// Light: PacketLight (runtime/cpu_light.h); null where there is the light at the eye alone.
+template <class Light>
+HWY_ATTR void write_packet(const BlockJob& job, const Packet& packet, const PacketHit& hit, Light* light, uint32_t x,
+                           uint32_t y, Strip& strip, WorkCounts& work)
 {
     const mask hits = packet.alive && hit.best < kHuge;
     const uint hit_lanes = lane_bits(hits);
@@ -190,7 +201,8 @@ HWY_INLINE void copy_to_strip(const PacketPixels& pixels, uint32_t x, uint32_t y
     // a surface without a normal faces the eye
     const real3 to_eye = along * (-1.0f / speed);
     normal = select(has_normal, normal, to_eye);
-    const real3 color = shade(shading.color, normal, to_eye);
+    const real3 color = light ? light->lit(packet, hit, {normal, to_eye, shading.color, real(kSpecular), hits})
+                              : shade(shading.color, normal, to_eye);
     const mask certified = hit.doubt >= kHuge || hit.doubt > hit.best;
 
     const real none = real(0.0f);

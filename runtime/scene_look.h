@@ -14,6 +14,7 @@
 namespace trimray {
 
 enum class LightKind {
+    Eye,         // at the eye: it moves with the camera and throws no shadow that is seen
     Directional, // from infinitely far, along `direction`
     Point,       // from `position_mm`, equally strong at every distance: what is lit does not depend on the unit
 };
@@ -76,6 +77,7 @@ struct SectionLook {
 };
 constexpr size_t kMostSectionPlanes = 6;
 
+/// Light from all around and above, hidden by what is near.
 struct Occlusion {
     uint32_t samples = 0;                                      // rays a pixel; 0: none
     double reach_mm = std::numeric_limits<double>::infinity(); // what is farther hides nothing
@@ -96,6 +98,9 @@ struct SceneLook {
     std::vector<Light> lights;   // none: the light at the eye
     uint32_t light_samples = 16; // rays a pixel to each light that is not a point or a direction alone
     Occlusion occlusion;
+    // Strength of the light from all around; none: 1, but where there is occlusion and no lights are named 3, and the
+    // light at the eye has 0.4 instead of 1, so that what is hidden is seen to be
+    std::optional<float> sky;
     uint32_t mirror_depth = 1; // reflections of reflections that are followed
     std::vector<MaterialRule> materials;
     std::optional<float> xray; // opacity of every surface that no rule gives one: all of them show through

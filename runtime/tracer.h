@@ -108,7 +108,8 @@ struct Frame {
 /// compare them before times.
 struct WorkCounts {
     uint64_t rays = 0, node_visits = 0, leaf_visits = 0, newton_steps = 0, curve_tests = 0, uncertified_pixels = 0;
-    uint64_t edge_tests = 0; // pieces of borders measured, a ray each
+    uint64_t edge_tests = 0;                      // pieces of borders measured, a ray each
+    uint64_t free_rays = 0, free_leaf_visits = 0; // rays from elsewhere than the eye, and the leaves that they met
 
     WorkCounts& operator+=(const WorkCounts& other)
     {
@@ -119,6 +120,8 @@ struct WorkCounts {
         curve_tests += other.curve_tests;
         uncertified_pixels += other.uncertified_pixels;
         edge_tests += other.edge_tests;
+        free_rays += other.free_rays;
+        free_leaf_visits += other.free_leaf_visits;
         return *this;
     }
 };

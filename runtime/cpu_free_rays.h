@@ -1,0 +1,201 @@
+// Packets of 16 rays that begin anywhere: those of shadows, occlusion and mirrors. They walk the trees from the top,
+// each packet by itself, and meet leaves as the eye's rays do. Included once per target by cpu_packet.h.
+#if defined(TRIMRAY_CPU_FREE_RAYS_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef TRIMRAY_CPU_FREE_RAYS_H
+#undef TRIMRAY_CPU_FREE_RAYS_H
+#else
+#define TRIMRAY_CPU_FREE_RAYS_H
+#endif
+
+#include "runtime/cpu_lanes.h"
+#include "runtime/cpu_leaf_hits.h"
+#include "runtime/cpu_write.h"
+#include "shaders/light_layout.h"
+#include "shaders/shared/bvh_node.h"
+#include "shaders/shared/leaf_box.h"
+
+#include <array>
+
+SHARED_OPEN
+
+/// 16 rays: origin + s direction, 0 < s < reach; the top tree's units, the direction unit.
+struct FreePacket {
+    real3 origin;
+    real3 direction;
+    real reach;
+    mask alive;
+    float footprint; // how well hits must be known: a pixel's width where the rays come from
+};
+
+/// What a packet's rays are for a patch: `at` is s.
+struct FreeRays {
+    static constexpr bool kCertifies = false;
+    mask alive;
+    real from; // s at t = 0
+    real rounding;
+    float pixel; // patch units
+
+    real base() const { return from; }
+    float per_t() const { return 1; }
+    real slack() const { return rounding; }
+    HWY_ATTR mask is_ahead(real at) const { return at > 0.0f; }
+    float footprint() const { return pixel; }
+    HWY_ATTR real footprint(real) const { return real(pixel); }
+};
+
+class FreeTracer {
+public:
+    FreeTracer(const BlockJob& job, BlockScratch& scratch, const FetchSource& source, WorkCounts& work)
+        : job_(job), scratch_(scratch), work_(work), image_(job.scene.image), leaf_hits_(job, scratch, source, work)
+    {
+        leaf_hits_.rims_cut = true;
+    }
+
+    /// The nearest hits; hit.best is s.
+    HWY_ATTR PacketHit closest(const FreePacket& rays)
+    {
+        PacketHit hit;
+        trace(rays, false, hit);
+        return hit;
+    }
+
+    /// The rays that anything stops.
+    HWY_ATTR mask stopped(const FreePacket& rays)
+    {
+        PacketHit hit;
+        trace(rays, true, hit);
+        return rays.alive && hit.leaf != integer(~0u);
+    }
+
+private:
+    static constexpr int kMostWaiting = 3 * int(kMaxBvhDepth) + 2; // a visit takes one and leaves up to four
+
+    /// A packet in the units of one tree.
+    struct TreePacket {
+        real3 origin, inverse;
+    };
+    static HWY_ATTR TreePacket tree_packet(real3 origin, real3 direction)
+    {
+        return {origin, real3(safe_inverse(direction.x), safe_inverse(direction.y), safe_inverse(direction.z))};
+    }
+
+    HWY_ATTR HWY_NOINLINE void trace(const FreePacket& rays, bool any, PacketHit& hit)
+    {
+        hit.best = select(rays.alive, rays.reach, real(-kHuge));
+        hit.leaf = integer(~0u);
+        hit.instance = integer(~0u);
+        hit.uv_face = real2(real(0.0f), real(0.0f));
+        hit.normal = real3(real(0.0f), real(0.0f), real(1.0f));
+        hit.back = mask(false);
+        hit.doubt = real(kHuge);
+        work_.free_rays += lane_count(rays.alive);
+        recent_.clear();
+        const auto enter = [&](uint instance) HWY_ATTR { meet_instance(rays, any, instance, hit); };
+        if (image_.instances.size() == 1)
+            enter(0);
+        else if (!image_.top_nodes.empty())
+            walk(image_.top_nodes.data(), tree_packet(rays.origin, rays.direction), hit, enter);
+    }
+
+    HWY_ATTR void meet_instance(const FreePacket& rays, bool any, uint instance, PacketHit& hit)
+    {
+        const PartRecord& part = image_.parts[image_.instances[instance].part];
+        if (part.node_count == 0)
+            return;
+        const WorldToPart& to = job_.light->to_part[instance];
+        const scalar3 row_x(to.row_x[0], to.row_x[1], to.row_x[2]), row_y(to.row_y[0], to.row_y[1], to.row_y[2]),
+            row_z(to.row_z[0], to.row_z[1], to.row_z[2]);
+        const real3 origin =
+            project(row_x, row_y, row_z, rays.origin) + scalar3(to.offset[0], to.offset[1], to.offset[2]);
+        const real3 direction = project(row_x, row_y, row_z, rays.direction);
+        walk(image_.part_nodes.data() + part.first_node, tree_packet(origin, direction), hit, [&](uint leaf) HWY_ATTR {
+            meet_leaf(rays, part.first_leaf + leaf, instance, origin, direction, to.scale * rays.footprint, hit);
+            if (any)
+                hit.best = select(hit.leaf != integer(~0u), real(-kHuge), hit.best);
+        });
+    }
+
+    HWY_ATTR void meet_leaf(const FreePacket& rays, uint leaf_id, uint instance, real3 part_origin,
+                            real3 part_direction, float part_footprint, PacketHit& hit)
+    {
+        constexpr float kBoxMargin = 1e-6f; // patch units: as for the eye's rays
+        const LeafRecord& leaf = image_.leaves[leaf_id];
+        const PatchRecord& patch = image_.patches[leaf.patch];
+        const scalar3 x(patch.axis_x[0], patch.axis_x[1], patch.axis_x[2]);
+        const scalar3 y(patch.axis_y[0], patch.axis_y[1], patch.axis_y[2]);
+        const scalar3 z(patch.axis_z[0], patch.axis_z[1], patch.axis_z[2]);
+        const scalar3 hi(patch.origin_hi[0], patch.origin_hi[1], patch.origin_hi[2]);
+        const scalar3 lo(patch.origin_lo[0], patch.origin_lo[1], patch.origin_lo[2]);
+        const float per_scale = 1 / patch.scale;
+        const real3 far_origin = project(x, y, z, (part_origin - hi) - lo) * real(per_scale);
+        const real3 direction = project(x, y, z, part_direction) * real(per_scale);
+        // t = 0 where the ray is nearest to the patch's middle, so that what is large has cancelled
+        const real square = dot(direction, direction);
+        const real from = -dot(far_origin, direction) / square;
+        const real3 origin = far_origin + direction * from;
+        const real rounding =
+            (8.0f * kRounding) * ((1.0f + length(origin)) / sqrt(square) + abs(from) + length(rays.origin));
+        const BoxHit in_box = leaf_box_hit(decode_leaf(leaf), origin, direction, kBoxMargin);
+        const mask alive =
+            in_box.hit && hit.best > -kHuge && from + in_box.far > 0.0f && from + in_box.near < hit.best + rounding;
+        if (!any_lane(alive) || (job_.scene.shared_patch[leaf.patch] && recent_.has(instance, leaf.patch)))
+            return;
+        work_.free_leaf_visits += lane_count(alive);
+        const FreeRays free{rays.alive && hit.best > -kHuge, from, rounding, part_footprint * per_scale};
+        FreeMiddles& kept = scratch_.free_middles;
+        const size_t slot = leaf_id % FreeMiddles::kCount;
+        uint8_t has_middle = kept.leaf[slot] == leaf_id;
+        const LeafAt at{leaf_id, instance, &kept.middle[slot], &has_middle};
+        leaf_hits_.intersect(free, at, origin, direction, hit);
+        kept.leaf[slot] = has_middle != 0 ? leaf_id : ~0u;
+    }
+
+    struct Waiting {
+        uint item;
+        float near; // least s of the rays that meet it
+    };
+
+    /// Calls meet(leaf) for the leaves of a tree whose boxes a ray meets before its hit, about the nearest first.
+    template <class Meet>
+    HWY_ATTR void walk(const BvhNode* nodes, const TreePacket& packet, const PacketHit& hit, Meet meet)
+    {
+        std::array<Waiting, kMostWaiting> stack;
+        stack[0] = {0, 0};
+        for (int count = 1; count > 0;) {
+            const Waiting next = stack[--count];
+            if (next.near > largest_lane(hit.best))
+                continue;
+            if ((next.item & kBvhLeaf) != 0) {
+                meet(next.item & ~kBvhLeaf);
+                continue;
+            }
+            const BvhNode& node = nodes[next.item];
+            ++work_.node_visits;
+            const NodeRay ray = node_ray(node, packet.origin, packet.inverse);
+            const int first = count;
+            for (int child = 0; child < 4; ++child) {
+                if (node.child[child] == kBvhEmpty)
+                    continue;
+                const ChildHit in_box = child_hit(node, ray, child, real(0.0f), hit.best);
+                const mask meets = in_box.hit && hit.best > -kHuge;
+                if (!any_lane(meets))
+                    continue;
+                const float near = -largest_lane(select(meets, -in_box.near, real(-kHuge)));
+                int at = count++;
+                for (; at > first && stack[at - 1].near < near; --at)
+                    stack[at] = stack[at - 1];
+                stack[at] = {node.child[child], near};
+            }
+        }
+    }
+
+    const BlockJob& job_;
+    BlockScratch& scratch_;
+    WorkCounts& work_;
+    const PackImage& image_;
+    LeafHits<FreeRays> leaf_hits_;
+    RecentPatches recent_;
+};
+
+SHARED_CLOSE
+#endif

@@ -1,0 +1,124 @@
+// The light at a packet's hits: lights and their shadows, occlusion. Included once per target by cpu_packet.h; nothing
+// here runs for a picture under the light at the eye alone.
+#if defined(TRIMRAY_CPU_LIGHT_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef TRIMRAY_CPU_LIGHT_H
+#undef TRIMRAY_CPU_LIGHT_H
+#else
+#define TRIMRAY_CPU_LIGHT_H
+#endif
+
+#include "runtime/cpu_free_rays.h"
+#include "runtime/cpu_lanes.h"
+#include "runtime/cpu_write.h"
+#include "shaders/light_layout.h"
+#include "shaders/shared/light.h"
+
+SHARED_OPEN
+
+class PacketLight {
+public:
+    PacketLight(const BlockJob& job, BlockScratch& scratch, const FetchSource& source, WorkCounts& work)
+        : job_(job), view_(job.light->frame.view), rays_(job, scratch, source, work)
+    {
+        FreeMiddles& kept = scratch.free_middles;
+        kept.middle.resize(FreeMiddles::kCount);
+        kept.leaf.resize(FreeMiddles::kCount, ~0u);
+    }
+
+    /// The colours that leave the hits of the eye's rays.
+    HWY_ATTR HWY_NOINLINE real3 lit(const Packet& packet, const PacketHit& hit, const LitPoints& points)
+    {
+        const real3 along = vector(view_.along) + packet.x * vector(view_.along_x) + packet.y * vector(view_.along_y);
+        const real past = select(points.alive, hit.best, real(0.0f));
+        const real3 place =
+            vector(view_.place) + packet.x * vector(view_.place_x) + packet.y * vector(view_.place_y) + along * past;
+        const real pixel = abs(past + view_.tau_ref) * view_.pixel;
+        return lit_at(place, pixel, points);
+    }
+
+private:
+    /// place: the top tree's units; pixel: its width there.
+    HWY_ATTR real3 lit_at(real3 place, real pixel, const LitPoints& points)
+    {
+        const mask turned = dot(points.normal, points.to_eye) < 0.0f;
+        const real3 normal = select(turned, -points.normal, points.normal);
+        FreePacket rays;
+        rays.origin = place + normal * start_distance(place, pixel * view_.error_px);
+        rays.footprint = -largest_lane(select(points.alive, -pixel, real(-kHuge)));
+        real3 sum =
+            points.color * (sky_light(points.normal, points.to_eye) * view_.sky * open_sky(points, normal, rays));
+        for (const LightRecord& light : job_.light->frame.lights)
+            sum = sum + from_light(light, points, normal, rays);
+        return sum;
+    }
+
+    static scalar3 vector(const float (&v)[3]) { return scalar3(v[0], v[1], v[2]); }
+
+    /// The share of the sky that nothing within reach hides.
+    HWY_ATTR real open_sky(const LitPoints& points, real3 normal, FreePacket& rays)
+    {
+        const uint count = view_.occlusion_samples;
+        if (count == 0)
+            return real(1.0f);
+        rays.alive = points.alive;
+        rays.reach = real(view_.occlusion_reach);
+        const float* disc = job_.light->frame.samples.data() + 2 * view_.light_samples;
+        real open(0.0f);
+        for (uint i = 0; i < count; ++i) {
+            const real2 at = turned(disc[2 * i], disc[2 * i + 1]);
+            rays.direction = cosine_direction(normal, at.x, at.y);
+            open = open + select(rays_.stopped(rays), real(0.0f), real(1.0f));
+        }
+        return open * real(1.0f / float(count));
+    }
+
+    HWY_ATTR real3 from_light(const LightRecord& light, const LitPoints& points, real3 normal, FreePacket& rays)
+    {
+        const scalar3 strength = vector(light.color);
+        const uint kind = light.kind & 3u;
+        if (kind == kLightEye)
+            return scaled(lit_by(points.color, points.specular, normal, points.to_eye, points.to_eye), strength);
+        const uint count = (light.kind & kLightSoft) != 0 ? view_.light_samples : 1;
+        const real3 middle = kind == kLightPoint ? vector(light.place) - rays.origin : real3(vector(light.place));
+        const real3 towards = middle * (1.0f / max(length(middle), real(1e-20f)));
+        const Tangents across = tangents_of(towards);
+        real3 sum(real(0.0f), real(0.0f), real(0.0f));
+        for (uint i = 0; i < count; ++i) {
+            real3 way = middle;
+            if ((light.kind & kLightSoft) != 0) {
+                const float* disc = job_.light->frame.samples.data() + 2 * i;
+                const real2 at = turned(disc[0], disc[1]) * real(light.radius);
+                way = way + across.u * at.x + across.v * at.y;
+            }
+            const real far = length(way);
+            rays.direction = way * (1.0f / max(far, real(1e-20f)));
+            const real3 lit = lit_by(points.color, points.specular, normal, points.to_eye, rays.direction);
+            const mask faces = points.alive && dot(normal, rays.direction) > 0.0f;
+            mask dark = !faces;
+            if ((light.kind & kLightShadows) != 0 && any_lane(faces)) {
+                rays.alive = faces;
+                rays.reach = kind == kLightPoint ? far : real(kHuge);
+                dark = dark || rays_.stopped(rays);
+            }
+            const real none(0.0f);
+            sum = sum + select(dark, real3(none, none, none), lit);
+        }
+        return scaled(sum, strength * (1.0f / float(count)));
+    }
+
+    /// A sample's point of the disc, turned by the pixel: lanes are 4 x 4 of them.
+    HWY_ATTR real2 turned(float x, float y) const
+    {
+        const real cosine = load(view_.turn_cos), sine = load(view_.turn_sin);
+        return real2(cosine * x - sine * y, sine * x + cosine * y);
+    }
+
+    static HWY_ATTR real3 scaled(real3 v, scalar3 by) { return real3(v.x * by.x, v.y * by.y, v.z * by.z); }
+
+    const BlockJob& job_;
+    const LightView& view_;
+    FreeTracer rays_;
+};
+
+SHARED_CLOSE
+#endif

@@ -1,0 +1,42 @@
+// What a picture's lights, occlusion and mirrors come to for both tracers: shaders/light_layout.h, from the scene's
+// look.
+#pragma once
+
+#include "format/pack_image.h"
+#include "runtime/tracer.h"
+#include "shaders/light_layout.h"
+
+#include <array>
+#include <vector>
+
+namespace trimray {
+
+/// The rays of a picture, world mm: pixel (x, y) from its middle sees eye + tau (w0 + x step_x + y step_y), |w0| = 1.
+struct ViewRays {
+    std::array<double, 3> eye_mm, w0, step_x, step_y;
+    double tau_ref; // mm; hits are kept relative to it
+};
+
+struct FrameLights {
+    LightView view;
+    std::vector<LightRecord> lights;
+    // Points of the unit disc, x and y in turn: view.light_samples for soft lights, then view.occlusion_samples
+    std::vector<float> samples;
+};
+
+/// Whether a picture is lit by more than the light at the eye: then tracers need FrameLights.
+bool has_lights(const SceneLook& look);
+
+/// Whether rays that do not begin at the eye are needed: then tracers need world_to_part.
+bool has_free_rays(const SceneLook& look);
+
+/// Fails: Usage (numbers that mean nothing, too many lights or samples).
+Status check_lights(const SceneLook& look);
+
+/// Domain: check_lights is ok.
+FrameLights frame_lights(const PackImage& image, const RenderOptions& options, const ViewRays& rays);
+
+/// By instance.
+std::vector<WorldToPart> world_to_part(const PackImage& image);
+
+} // namespace trimray
