@@ -13,6 +13,7 @@
 #include "shaders/light_layout.h"
 #include "shaders/shared/bvh_node.h"
 #include "shaders/shared/leaf_box.h"
+#include "shaders/shared/light.h"
 
 #include <array>
 
@@ -133,8 +134,7 @@ private:
         const real square = dot(direction, direction);
         const real from = -dot(far_origin, direction) / square;
         const real3 origin = far_origin + direction * from;
-        const real rounding =
-            (8.0f * kRounding) * ((1.0f + length(origin)) / sqrt(square) + abs(from) + length(rays.origin));
+        const real rounding = free_rounding(length(origin), sqrt(square), from, length(rays.origin));
         const BoxHit in_box = leaf_box_hit(decode_leaf(leaf), origin, direction, kBoxMargin);
         const mask alive =
             in_box.hit && hit.best > -kHuge && from + in_box.far > 0.0f && from + in_box.near < hit.best + rounding;

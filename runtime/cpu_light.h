@@ -80,15 +80,12 @@ private:
             return scaled(lit_by(points.color, points.specular, normal, points.to_eye, points.to_eye), strength);
         const uint count = (light.kind & kLightSoft) != 0 ? view_.light_samples : 1;
         const real3 middle = kind == kLightPoint ? vector(light.place) - rays.origin : real3(vector(light.place));
-        const real3 towards = middle * (1.0f / max(length(middle), real(1e-20f)));
-        const Tangents across = tangents_of(towards);
         real3 sum(real(0.0f), real(0.0f), real(0.0f));
         for (uint i = 0; i < count; ++i) {
             real3 way = middle;
             if ((light.kind & kLightSoft) != 0) {
                 const float* disc = job_.light->frame.samples.data() + 2 * i;
-                const real2 at = turned(disc[0], disc[1]) * real(light.radius);
-                way = way + across.u * at.x + across.v * at.y;
+                way = way_to_disc(middle, light.radius, turned(disc[0], disc[1]));
             }
             const real far = length(way);
             rays.direction = way * (1.0f / max(far, real(1e-20f)));
@@ -109,8 +106,7 @@ private:
     /// A sample's point of the disc, turned by the pixel: lanes are 4 x 4 of them.
     HWY_ATTR real2 turned(float x, float y) const
     {
-        const real cosine = load(view_.turn_cos), sine = load(view_.turn_sin);
-        return real2(cosine * x - sine * y, sine * x + cosine * y);
+        return turned_sample(real2(scalar2(x, y)), load(view_.turn_cos), load(view_.turn_sin));
     }
 
     static HWY_ATTR real3 scaled(real3 v, scalar3 by) { return real3(v.x * by.x, v.y * by.y, v.z * by.z); }

@@ -11,7 +11,6 @@ namespace {
 
 using Vec3 = std::array<double, 3>;
 
-constexpr size_t kMostLights = 16;
 constexpr uint32_t kMostSamples = 4096;
 constexpr uint32_t kMostReflections = 8;
 

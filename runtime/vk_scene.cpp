@@ -206,6 +206,7 @@ Result<FrameSetup> frame_setup(const CpuScene& scene, const RenderOptions& optio
     const double per_length = 1.0 / length(through_middle);
 
     FrameSetup setup;
+    setup.eye = rays.eye;
     setup.w0 = through_middle * per_length;
     setup.step_x = rays.step_x * per_length;
     setup.step_y = rays.step_y * per_length;

@@ -36,7 +36,7 @@ Status upload_kd(VulkanDevice& device, const KdTrims& kd, std::array<VulkanBuffe
 struct FrameSetup {
     FrameView view{};
     std::vector<FrameInstance> instances; // never empty: a scene without any gets one that nothing refers to
-    std::array<double, 3> w0{}, step_x{}, step_y{};
+    std::array<double, 3> eye{}, w0{}, step_x{}, step_y{};
 };
 /// Fails: InvalidPack (an instance whose transform has no inverse).
 Result<FrameSetup> frame_setup(const CpuScene& scene, const RenderOptions& options);

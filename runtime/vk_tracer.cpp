@@ -2,6 +2,7 @@
 // band, and reads the last frame's pixels back.
 #include "runtime/border_cells.h"
 #include "runtime/frame_effects.h"
+#include "runtime/light_view.h"
 #include "runtime/stochastic_frames.h"
 #include "runtime/tracer.h"
 #include "runtime/trim_mode.h"
@@ -32,6 +33,9 @@ namespace {
 const uint32_t kPrimarySpirv[] =
 #include "primary.comp.inc"
     ;
+const uint32_t kLightSpirv[] =
+#include "light.comp.inc"
+    ;
 
 // Bounds the memory of a band and the time of a dispatch, which some drivers end after a second or two
 constexpr size_t kBandBytes = size_t{32} << 20;
@@ -46,6 +50,14 @@ constexpr uint32_t kMostRetries = 4096;
 
 // Larger nets are read from the buffer on the software driver too: so many floats lie beside each invocation
 constexpr uint32_t kMostLocalFloats = 1024;
+
+// Rays a pixel that one dispatch of light.comp casts: on the software driver a ray takes what the loop limit allows
+constexpr uint32_t kSamplesADispatch = 16, kSoftwareSamplesADispatch = 1;
+
+bool is_lit(const RenderOptions& options)
+{
+    return options.shade && has_lights(options.look);
+}
 
 bool reuses_hits(const RenderOptions& options)
 {
@@ -78,11 +90,13 @@ private:
     using Specialisation = std::array<uint32_t, kFrameSpecs>;
 
     Status upload_trims(TrimMode trim);
-    Result<ComputePipeline*> pipeline(TrimMode trim, const RenderOptions& options, bool count);
+    Result<ComputePipeline*> pipeline(std::span<const uint32_t> spirv, TrimMode trim, const RenderOptions& options,
+                                      bool count);
     Status prepare_frame(const FrameSetup& setup, uint32_t rows_per_band);
     Status prepare_edges(const RenderOptions& options, uint32_t rows_per_band);
     Status prepare_hits(std::initializer_list<uint32_t> bindings, size_t pixels, size_t pixel_bytes,
                         const char* option);
+    Status prepare_lights(const RenderOptions& options, const FrameSetup& setup, uint32_t rows_per_band);
     Status prepare_kept(const RenderOptions& options);
     Result<bool> prepare_last_hits(const RenderOptions& options);
     Status fill(uint32_t binding, uint32_t word);
@@ -94,6 +108,10 @@ private:
     Status read_edges(const FrameView& view);
     std::vector<uint32_t> stopped_pixels(const FrameView& view) const;
     Result<double> retrace_stopped(const ComputePipeline& pipeline, FrameView view);
+    Status set_retries(std::span<const uint32_t> pixels);
+    Result<uint32_t> read_stopped_count();
+    Result<double> gather_samples(FrameView view);
+    Result<double> gather_light(FrameView view);
     Result<double> trace_band(const ComputePipeline& pipeline, const FrameView& view, bool read_back);
     Result<double> trace_frame(const ComputePipeline& pipeline, FrameView view, uint32_t rows_per_band, Frame* frame);
     void take_pixels(const FrameView& view, Frame& frame) const;
@@ -114,8 +132,16 @@ private:
     std::array<uint32_t, 2> next_hits_size_{}; // of the picture whose hits kBindNextHits holds; 0 x 0: of none
     VulkanBuffer retries_upload_;              // of kMostRetries indices
     VulkanBuffer counts_readback_;
+    FrameLights lights_;                        // of the picture at hand
+    ComputePipeline* light_pipeline_ = nullptr; // that gathers them; null: none needs rays
+    VulkanBuffer nothing_;                      // stands for what the picture does not need
     QueryPool timestamps_;
-    std::deque<std::pair<Specialisation, ComputePipeline>> pipelines_; // pointers handed out stay good
+    struct MadePipeline {
+        const uint32_t* spirv;
+        Specialisation constants;
+        ComputePipeline pipeline;
+    };
+    std::deque<MadePipeline> pipelines_; // pointers handed out stay good
 };
 
 Status VulkanTracer::upload()
@@ -136,6 +162,10 @@ Status VulkanTracer::upload()
     if (!counts_readback)
         return counts_readback.error();
     counts_readback_ = std::move(*counts_readback);
+    Result<VulkanBuffer> nothing = VulkanBuffer::create(*device_, BufferUse::Storage, 1, "nothing");
+    if (!nothing)
+        return nothing.error();
+    nothing_ = std::move(*nothing);
     const size_t retry_bytes = kMostRetries * sizeof(uint32_t);
     Result<VulkanBuffer> retries = VulkanBuffer::create(*device_, BufferUse::Storage, retry_bytes, "pixels to retry");
     if (!retries)
@@ -173,7 +203,8 @@ Status VulkanTracer::upload_trims(TrimMode trim)
     return Done{};
 }
 
-Result<ComputePipeline*> VulkanTracer::pipeline(TrimMode trim, const RenderOptions& options, bool count)
+Result<ComputePipeline*> VulkanTracer::pipeline(std::span<const uint32_t> spirv, TrimMode trim,
+                                                const RenderOptions& options, bool count)
 {
     Specialisation constants{};
     constants[kSpecTrimMode] = trim == TrimMode::Sdf      ? kTrimByTexture
@@ -184,21 +215,22 @@ Result<ComputePipeline*> VulkanTracer::pipeline(TrimMode trim, const RenderOptio
     const bool stochastic = options.closest == ClosestPolicy::Stochastic;
     constants[kSpecFeatures] = facts_.features | (options.shade ? kFeatureShade : 0) | (count ? kFeatureCount : 0) |
                                (edges_wanted_ ? kFeatureEdges : 0) | (stochastic ? kFeatureStochastic : 0) |
-                               (keeps_hits(options) ? kFeatureKept : 0) | (reuses_hits(options) ? kFeatureReuse : 0);
+                               (keeps_hits(options) ? kFeatureKept : 0) | (reuses_hits(options) ? kFeatureReuse : 0) |
+                               (is_lit(options) ? kFeatureLights : 0);
     constants[kSpecStackSize] = facts_.stack_size;
     if (device_->is_software()) {
         constants[kSpecLocalFloats] = facts_.largest_net_floats <= kMostLocalFloats ? facts_.largest_net_floats : 0;
         constants[kSpecIterationLimit] = edges_wanted_ ? kSoftwareIterationLimitWithEdges : kSoftwareIterationLimit;
     }
-    for (auto& [made_for, made] : pipelines_)
-        if (made_for == constants)
-            return &made;
+    for (MadePipeline& made : pipelines_)
+        if (made.spirv == spirv.data() && made.constants == constants)
+            return &made.pipeline;
     Result<ComputePipeline> made =
-        ComputePipeline::create(*device_, kPrimarySpirv, kFrameBindings, sizeof(FrameView), constants);
+        ComputePipeline::create(*device_, spirv, kFrameBindings, sizeof(FrameView), constants);
     if (!made)
         return made.error();
-    pipelines_.emplace_back(constants, std::move(*made));
-    return &pipelines_.back().second;
+    pipelines_.push_back({spirv.data(), constants, std::move(*made)});
+    return &pipelines_.back().pipeline;
 }
 
 // Uploads the instances as the frame sees them and makes the buffers of a band's pixels, if those there are too small.
@@ -256,6 +288,43 @@ Status VulkanTracer::prepare_edges(const RenderOptions& options, uint32_t rows_p
         edge_map_.resize(options.width, options.height, query.line_reach_px > 0, query.border_reach_px > 0);
     }
     return Done{};
+}
+
+// Uploads what a picture's lights are, and where they are gathered. Nothing is made for the light at the eye alone.
+Status VulkanTracer::prepare_lights(const RenderOptions& options, const FrameSetup& setup, uint32_t rows_per_band)
+{
+    lights_ = {};
+    if (!is_lit(options))
+        return Done{};
+    const PackImage& image = scene_->pack.image;
+    lights_ = frame_lights(image, options, {setup.eye, setup.w0, setup.step_x, setup.step_y, setup.view.tau_ref});
+    std::vector<LightRecord> records = lights_.lights;
+    records.resize(kMostLights);
+    std::vector<std::byte> bytes;
+    const auto append = [&bytes](std::span<const std::byte> more) {
+        bytes.insert(bytes.end(), more.begin(), more.end());
+    };
+    append(std::as_bytes(std::span(&lights_.view, 1)));
+    append(std::as_bytes(std::span(records)));
+    append(std::as_bytes(std::span(lights_.samples)));
+    Result<VulkanBuffer> uploaded = upload_storage(*device_, bytes, "the lights");
+    if (!uploaded)
+        return uploaded.error();
+    buffers_[kBindLights] = std::move(*uploaded);
+    const size_t band_pixels = size_t{rows_per_band} * options.width;
+    if (const Status ready = prepare_hits({kBindLitPixels}, band_pixels, sizeof(LitPixel), "the lights"); !ready)
+        return ready;
+    if (!has_free_rays(options.look))
+        return Done{};
+    if (buffers_[kBindToPart].size_bytes() == 0) {
+        const std::vector<WorldToPart> to_part = world_to_part(image);
+        Result<VulkanBuffer> parts = upload_storage(*device_, std::as_bytes(std::span(to_part)), "the placements");
+        if (!parts)
+            return parts.error();
+        buffers_[kBindToPart] = std::move(*parts);
+    }
+    return device_->is_software() ? prepare_hits({kBindStopped}, band_pixels + 1, sizeof(uint32_t), "the lights")
+                                  : Status(Done{});
 }
 
 // Makes buffers of one record a pixel, if those there are too small. `option`: what asks for them.
@@ -395,6 +464,18 @@ std::vector<uint32_t> VulkanTracer::stopped_pixels(const FrameView& view) const
     return stopped;
 }
 
+// What the next dispatch with FrameView::alone traces; at most kMostRetries.
+Status VulkanTracer::set_retries(std::span<const uint32_t> pixels)
+{
+    std::memcpy(retries_upload_.mapped(), pixels.data(), pixels.size_bytes());
+    if (const Status ready = retries_upload_.flush(); !ready)
+        return ready;
+    return device_->run([&](VkCommandBuffer commands) {
+        const VkBufferCopy region{0, 0, pixels.size_bytes()};
+        device_->vk().vkCmdCopyBuffer(commands, retries_upload_.handle(), buffers_[kBindRetries].handle(), 1, &region);
+    });
+}
+
 // A subgroup's lanes share the driver's limit; a pixel traced by itself has all of it. Returns milliseconds.
 // Fails: DeviceFailed, if one needs more even so.
 Result<double> VulkanTracer::retrace_stopped(const ComputePipeline& pipeline, FrameView view)
@@ -404,15 +485,7 @@ Result<double> VulkanTracer::retrace_stopped(const ComputePipeline& pipeline, Fr
     view.alone = 1;
     for (size_t first = 0; first < stopped.size(); first += kMostRetries) {
         const auto count = static_cast<uint32_t>(std::min<size_t>(kMostRetries, stopped.size() - first));
-        std::memcpy(retries_upload_.mapped(), &stopped[first], count * sizeof(uint32_t));
-        Status ready = retries_upload_.flush();
-        if (ready.ok())
-            ready = device_->run([&](VkCommandBuffer commands) {
-                const VkBufferCopy region{0, 0, count * sizeof(uint32_t)};
-                device_->vk().vkCmdCopyBuffer(commands, retries_upload_.handle(), buffers_[kBindRetries].handle(), 1,
-                                              &region);
-            });
-        if (!ready)
+        if (const Status ready = set_retries(std::span(stopped).subspan(first, count)); !ready)
             return ready.error();
         const Result<double> retry_ms = time_dispatch(pipeline, view, count, 1);
         if (!retry_ms)
@@ -431,18 +504,127 @@ Result<double> VulkanTracer::retrace_stopped(const ComputePipeline& pipeline, Fr
     return ms;
 }
 
+// How many pixels light.comp's last dispatch must gather for again.
+Result<uint32_t> VulkanTracer::read_stopped_count()
+{
+    const Status copied = device_->run([&](VkCommandBuffer commands) {
+        const VkBufferCopy region{0, 0, sizeof(uint32_t)};
+        device_->vk().vkCmdCopyBuffer(commands, buffers_[kBindStopped].handle(), counts_readback_.handle(), 1, &region);
+    });
+    if (!copied)
+        return copied.error();
+    if (const Status seen = counts_readback_.invalidate(); !seen)
+        return seen.error();
+    uint32_t count = 0;
+    std::memcpy(&count, counts_readback_.mapped(), sizeof count);
+    return count;
+}
+
+// One dispatch of light.comp over the band, and again for the pixels that the driver's loop limit stopped, each alone.
+// Returns milliseconds. Fails: DeviceFailed, if one needs more even so.
+Result<double> VulkanTracer::gather_samples(FrameView view)
+{
+    const bool limited = device_->is_software();
+    const auto gather = [&](uint32_t groups_x, uint32_t groups_y) -> Result<double> {
+        if (limited)
+            if (const Status none = fill(kBindStopped, 0); !none)
+                return none.error();
+        return time_dispatch(*light_pipeline_, view, groups_x, groups_y);
+    };
+    Result<double> ms =
+        gather((view.width + kGroupSide - 1) / kGroupSide, (view.row_count + kGroupSide - 1) / kGroupSide);
+    if (!ms || !limited)
+        return ms;
+    const Result<uint32_t> count = read_stopped_count();
+    if (!count)
+        return count.error();
+    if (*count == 0)
+        return ms;
+    Result<VulkanBuffer> list =
+        VulkanBuffer::create(*device_, BufferUse::Readback, (*count + size_t{1}) * sizeof(uint32_t), "pixels to retry");
+    if (!list)
+        return list.error();
+    const Status copied = device_->run([&](VkCommandBuffer commands) {
+        const VkBufferCopy region{0, 0, (*count + size_t{1}) * sizeof(uint32_t)};
+        device_->vk().vkCmdCopyBuffer(commands, buffers_[kBindStopped].handle(), list->handle(), 1, &region);
+    });
+    if (!copied)
+        return copied.error();
+    if (const Status seen = list->invalidate(); !seen)
+        return seen.error();
+    std::vector<uint32_t> pixels(*count);
+    std::memcpy(pixels.data(), list->mapped() + sizeof(uint32_t), pixels.size() * sizeof(uint32_t));
+    view.alone = 1;
+    for (size_t first = 0; first < pixels.size(); first += kMostRetries) {
+        const auto here = std::span(pixels).subspan(first, std::min<size_t>(kMostRetries, pixels.size() - first));
+        if (const Status ready = set_retries(here); !ready)
+            return ready.error();
+        const Result<double> alone_ms = gather(static_cast<uint32_t>(here.size()), 1);
+        if (!alone_ms)
+            return alone_ms;
+        const Result<uint32_t> left = read_stopped_count();
+        if (!left)
+            return left.error();
+        if (*left > 0)
+            return Error{ErrorCode::DeviceFailed, device_->name(),
+                         fmt::format("the rays to lights of {} pixels need more loop iterations than this software "
+                                     "driver runs; use --device cpu",
+                                     *left)};
+        *ms += *alone_ms;
+    }
+    return ms;
+}
+
+// Adds to the band's pixels the light that rays must be asked for. Returns milliseconds.
+Result<double> VulkanTracer::gather_light(FrameView view)
+{
+    double ms = 0;
+    const uint32_t at_once = device_->is_software() ? kSoftwareSamplesADispatch : kSamplesADispatch;
+    const auto gather = [&](uint32_t light, uint32_t sample_count) -> Status {
+        view.gathered = light;
+        for (view.first_sample = 0; view.first_sample < sample_count; view.first_sample += at_once) {
+            view.end_sample = std::min(view.first_sample + at_once, sample_count);
+            const Result<double> some_ms = gather_samples(view);
+            if (!some_ms)
+                return some_ms.error();
+            ms += *some_ms;
+        }
+        return Done{};
+    };
+    if (const Status sky = gather(kGatherSky, lights_.view.occlusion_samples); !sky)
+        return sky.error();
+    for (uint32_t i = 0; i < lights_.lights.size(); ++i) {
+        const uint32_t kind = lights_.lights[i].kind;
+        if ((kind & kLightShadows) == 0)
+            continue;
+        if (const Status lit = gather(i, (kind & kLightSoft) != 0 ? lights_.view.light_samples : 1); !lit)
+            return lit.error();
+    }
+    return ms;
+}
+
 Result<double> VulkanTracer::trace_band(const ComputePipeline& pipeline, const FrameView& view, bool read_back)
 {
-    const Result<double> ms = time_dispatch(pipeline, view, (view.width + kGroupSide - 1) / kGroupSide,
-                                            (view.row_count + kGroupSide - 1) / kGroupSide);
-    if (!ms || !read_back)
+    Result<double> ms = time_dispatch(pipeline, view, (view.width + kGroupSide - 1) / kGroupSide,
+                                      (view.row_count + kGroupSide - 1) / kGroupSide);
+    if (ms.ok() && read_back && device_->is_software()) {
+        if (const Status read = read_band(view); !read)
+            return read.error();
+        const Result<double> retry_ms = retrace_stopped(pipeline, view);
+        if (!retry_ms)
+            return retry_ms;
+        *ms += *retry_ms;
+    }
+    if (ms.ok() && light_pipeline_) {
+        const Result<double> light_ms = gather_light(view);
+        if (!light_ms)
+            return light_ms;
+        *ms += *light_ms;
+    }
+    if (!ms || !read_back || (device_->is_software() && !light_pipeline_))
         return ms;
-    if (const Status read = read_band(view); !read)
-        return read.error();
-    if (!device_->is_software())
-        return ms;
-    const Result<double> retry_ms = retrace_stopped(pipeline, view);
-    return retry_ms.ok() ? Result<double>(*ms + *retry_ms) : retry_ms;
+    const Status read = read_band(view);
+    return read.ok() ? ms : Result<double>(read.error());
 }
 
 // Traces all bands; `frame` may be null, then nothing is read back. Returns milliseconds.
@@ -536,6 +718,8 @@ Result<Frame> VulkanTracer::render(const RenderOptions& options, RenderStats& st
         return Error{ErrorCode::UnsupportedPackFeature, "--trim reference", "is the CPU tracer's; use --device cpu"};
     if (const Status drawable = check_effects(options); !drawable)
         return drawable.error();
+    if (const Status lights = check_lights(options.look); !lights)
+        return lights.error();
     const VkPhysicalDeviceLimits& limits = device_->properties().limits;
     const size_t row_bytes = size_t{options.width} * sizeof(FramePixel);
     const size_t band_bytes = std::min<size_t>(kBandBytes, limits.maxStorageBufferRange);
@@ -555,6 +739,8 @@ Result<Frame> VulkanTracer::render(const RenderOptions& options, RenderStats& st
         return ready.error();
     if (const Status ready = prepare_edges(options, rows_per_band); !ready)
         return ready.error();
+    if (const Status ready = prepare_lights(options, *setup, rows_per_band); !ready)
+        return ready.error();
     if (const Status ready = prepare_kept(options); !ready)
         return ready.error();
     const Result<bool> reused_last = prepare_last_hits(options);
@@ -564,17 +750,28 @@ Result<Frame> VulkanTracer::render(const RenderOptions& options, RenderStats& st
     // With one frame it counts its work itself; with more an untimed one before them does
     const uint32_t frames = std::max(options.frames, 1u);
     const bool count_apart = frames > 1;
-    const Result<ComputePipeline*> counting = pipeline(*trim, options, true);
+    const Result<ComputePipeline*> counting = pipeline(kPrimarySpirv, *trim, options, true);
     if (!counting)
         return counting.error();
-    const Result<ComputePipeline*> timed = pipeline(*trim, options, !count_apart);
+    const Result<ComputePipeline*> timed = pipeline(kPrimarySpirv, *trim, options, !count_apart);
     if (!timed)
         return timed.error();
     std::array<const VulkanBuffer*, kFrameBindings> bound{};
     for (uint32_t i = 0; i < kFrameBindings; ++i)
-        bound[i] = &buffers_[i];
+        bound[i] = buffers_[i].size_bytes() > 0 ? &buffers_[i] : &nothing_;
     (*counting)->set_buffers(bound);
     (*timed)->set_buffers(bound);
+    std::array<ComputePipeline*, 2> light_pipelines{}; // that count, and that are timed
+    if (is_lit(options) && has_free_rays(options.look))
+        for (size_t i = 0; i < 2; ++i) {
+            const Result<ComputePipeline*> light = pipeline(kLightSpirv, *trim, options, i == 0 || !count_apart);
+            if (!light)
+                return light.error();
+            (*light)->set_buffers(bound);
+            if (const Result<double> warm = time_dispatch(**light, setup->view, 1, 1); !warm)
+                return warm.error();
+            light_pipelines[i] = *light;
+        }
     // an empty band: drivers that compile at the first dispatch do it here
     if (const Result<double> warm = time_dispatch(**timed, setup->view, 1, 1); !warm)
         return warm.error();
@@ -589,12 +786,14 @@ Result<Frame> VulkanTracer::render(const RenderOptions& options, RenderStats& st
     choose_start(0);
     if (const Status none = forget_kept(); !none)
         return none.error();
+    light_pipeline_ = light_pipelines[0];
     if (count_apart) {
         if (const Result<double> ms = trace_frame(**counting, view, rows_per_band, nullptr); !ms)
             return ms.error();
         if (const Status none = forget_kept(); !none)
             return none.error();
     }
+    light_pipeline_ = light_pipelines[1];
     Frame frame;
     const size_t pixels = size_t{options.width} * options.height;
     frame.width = options.width;
@@ -632,6 +831,8 @@ Result<Frame> VulkanTracer::render(const RenderOptions& options, RenderStats& st
     stats.work.newton_steps = (*counts)[kCountNewton];
     stats.work.curve_tests = (*counts)[kCountCurves];
     stats.work.edge_tests = (*counts)[kCountEdges];
+    stats.work.free_rays = (*counts)[kCountFreeRays];
+    stats.work.free_leaf_visits = (*counts)[kCountFreeLeaves];
     stats.work.uncertified_pixels =
         static_cast<uint64_t>(std::count(frame.certified.begin(), frame.certified.end(), uint8_t{0}));
     if (const Status valid = device_->validation_status(); !valid)

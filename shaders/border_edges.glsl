@@ -37,13 +37,13 @@ SurfacePoint bezier_at(PatchRecord patch, vec2 uv_face)
     return bezier_point(patch.first_control_point, int(degree_u), int(degree_v), rational, uv);
 }
 
-Measured measured_hit(Hit hit, FrameInstance instance, PatchRecord patch, vec2 pixel)
+Measured measured_hit(Hit hit, FrameInstance instance, PatchRecord patch, Ray eye_ray)
 {
     Measured m;
     m.patch = patch;
     m.kind = patch.shape & 0xffu;
     m.uv = hit.uv_face;
-    PatchRay ray = patch_ray(instance, patch, pixel);
+    PatchRay ray = patch_ray(instance, hit.instance, patch, eye_ray);
     m.p = ray.origin + hit.t * ray.direction;
     float per_scale = 1.0f / patch.scale;
     vec3 axis_x = vector(patch.axis_x);
@@ -208,13 +208,13 @@ uint word_within(NearestBorder nearest, float reach)
 }
 
 // The words of the nearest line and the nearest border
-uvec2 find_edges(Hit hit, vec2 pixel)
+uvec2 find_edges(Hit hit, Ray eye_ray)
 {
     PatchRecord patch = patches[leaves[hit.leaf].patch];
     FaceRecord face = faces[patch.face];
     nearest_line = NearestBorder(vec2(0.0f), kHuge, 1.0f);
     nearest_border = nearest_line;
-    Measured m = measured_hit(hit, instances[hit.instance], patch, pixel);
+    Measured m = measured_hit(hit, instances[hit.instance], patch, eye_ray);
     float reach = max(view.line_reach_px, view.border_reach_px);
     m.reach_uv = reach_in_uv(m.map, reach);
     if ((face.flags & kFaceNaturalBorder) != 0u)

@@ -1,4 +1,4 @@
-// What passes between the host and primary.comp beside the pack's own arrays: the view, the instances seen from it, a
+// What passes between the host and the shaders beside the pack's own arrays: the view, the instances seen from it, a
 // pixel's result and the work counts. Scalar block layout, 4-byte fields.
 //
 // Pixel (x, y) looks along w = w0 + dx step_x + dy step_y, where dx, dy are pixels from the picture's middle and
@@ -34,6 +34,10 @@ struct FrameView {
     uint line_classes; // bit kEdge...
     float start[2];    // with kFeatureStochastic: start_of_frame (runtime/stochastic_frames.h)
     uint alone;        // 1: each workgroup traces pixel retries[workgroup] of the band, with one of its invocations
+    // of light.comp: what is gathered, a light's number or kGatherSky, and samples [first_sample, end_sample) of it
+    uint gathered;
+    uint first_sample;
+    uint end_sample;
 };
 
 // An instance seen from the eye, in its part's units.
@@ -95,9 +99,11 @@ TRIMRAY_CONST uint kCountLeaves = 2u;
 TRIMRAY_CONST uint kCountNewton = 3u;
 TRIMRAY_CONST uint kCountCurves = 4u;
 TRIMRAY_CONST uint kCountEdges = 5u;
-TRIMRAY_CONST uint kFrameCounts = 6u;
+TRIMRAY_CONST uint kCountFreeRays = 6u;
+TRIMRAY_CONST uint kCountFreeLeaves = 7u;
+TRIMRAY_CONST uint kFrameCounts = 8u;
 
-// Specialisation constants of primary.comp, by constant_id
+// Specialisation constants of primary.comp and light.comp, by constant_id
 TRIMRAY_CONST uint kSpecTrimMode = 0u; // kTrimBy
 TRIMRAY_CONST uint kSpecKinds = 1u;    // bit kKind...: the pack holds such patches
 TRIMRAY_CONST uint kSpecFeatures = 2u; // kFeature bits
@@ -121,9 +127,13 @@ TRIMRAY_CONST uint kFeatureStochastic = 64u; // ClosestPolicy::Stochastic
 TRIMRAY_CONST uint kFeatureKept = 128u;      // ... in more frames than one
 TRIMRAY_CONST uint kFeatureReuse = 256u;     // RenderOptions::reuse_last
 
+TRIMRAY_CONST uint kFeatureLights = 512u; // SceneLook's lights: the pixels' LitPixels are kept
+
+TRIMRAY_CONST uint kGatherSky = 0xffffffffu; // FrameView::gathered
+
 TRIMRAY_CONST uint kGroupSide = 8u; // workgroups are 8 x 8 pixels
 
-// Bindings of primary.comp
+// Bindings of primary.comp and light.comp
 TRIMRAY_CONST uint kBindInstances = 0u;
 TRIMRAY_CONST uint kBindTopNodes = 1u;
 TRIMRAY_CONST uint kBindPartNodes = 2u;
@@ -149,10 +159,15 @@ TRIMRAY_CONST uint kBindKept = 20u; // a KeptHit a pixel of the picture; of one 
 // a LastHit a pixel of the picture; of one element without kFeatureReuse
 TRIMRAY_CONST uint kBindLastHits = 21u; // the last picture's
 TRIMRAY_CONST uint kBindNextHits = 22u; // this one's, for the next
-TRIMRAY_CONST uint kFrameBindings = 23u;
+// of one element without kFeatureLights
+TRIMRAY_CONST uint kBindLights = 23u;    // LightView, kMostLights LightRecords, samples (shaders/light_layout.h)
+TRIMRAY_CONST uint kBindToPart = 24u;    // a WorldToPart an instance
+TRIMRAY_CONST uint kBindLitPixels = 25u; // a LitPixel a pixel of the band
+TRIMRAY_CONST uint kBindStopped = 26u; // pixels of the band that light.comp must gather for again: how many, and which
+TRIMRAY_CONST uint kFrameBindings = 27u;
 
 #ifdef __cplusplus
-static_assert(sizeof(FrameView) == 116);
+static_assert(sizeof(FrameView) == 128); // what every device takes
 static_assert(sizeof(FrameInstance) == 144);
 static_assert(sizeof(FramePixel) == 52);
 static_assert(sizeof(KeptHit) == 32);

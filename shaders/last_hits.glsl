@@ -1,11 +1,5 @@
 // Moving cameras: what a pixel's ray may meet, guessed from the last picture's hits. A guess chooses the leaf that is
-// searched first; it decides nothing, so any is allowed.
-
-// A leaf of an instance; kNoLeaf: none
-struct Guess {
-    uint leaf;
-    uint instance;
-};
+// searched first (walk.glsl); it decides nothing, so any is allowed.
 
 // Where the last picture's hit in this very pixel is seen now tells how far things moved; what is seen here now was as
 // far behind. `at` is of the whole picture.

@@ -1,4 +1,5 @@
-// A ray against one leaf: into the patch's space, the leaf's box, the roots, the face's domain and its trims.
+// A ray against one leaf: its box, the roots, the face's domain and its trims. What a ray is says eye_rays.glsl or
+// free_rays.glsl.
 
 const float kBoxMargin = 1e-6f;                    // patch units: the ray's rounding, and the box's
 const uint kRunIterations = 24u + 27u;             // bound of kd_crossed: bisections, halvings of a run
@@ -21,59 +22,8 @@ uint split_iterations()
     return min(kRoundIterations / 2u, (most - min(group_iterations, most)) / 6u);
 }
 
-// The nearest hit so far. `past` is tau - view.tau_ref, so that what is far from the eye keeps its digits.
-struct Hit {
-    float past; // kHuge: none yet
-    float t;    // along the patch's ray
-    vec2 uv_face;
-    vec2 uv_patch;
-    uint leaf;
-    uint instance;
-    float doubt; // from where on a leaf may hold hits that were not found, as `past`; kHuge: there is none
-    bool back;   // it may be a rim's
-    bool own;    // it lies in its leaf, not beside it
-    float slack; // rounding of `past`
-};
-
 // A rim's back counts as a surface first, for few rays meet one: where it is what they see they are traced again.
 bool rims_cut = false;
-
-// A point at t is origin + t * direction in patch space; t counts mm of tau.
-struct PatchRay {
-    vec3 origin;
-    vec3 direction;
-    float anchor; // tau at t = 0
-    float past;   // anchor - view.tau_ref
-    float slack;  // rounding of a hit's `past`
-    float pixel;  // width of a pixel at tau = 1, patch units
-};
-
-// Source: shaders/shared/precision.h
-PatchRay patch_ray(FrameInstance instance, PatchRecord patch, vec2 pixel)
-{
-    vec3 w0 = vector(instance.w0_hi);
-    precise vec3 across = pixel.x * vector(instance.step_x) + pixel.y * vector(instance.step_y);
-    PatchRay ray;
-    ray.anchor = dot(vector(patch.origin_hi) - vector(instance.eye_hi), w0) / dot(w0, w0);
-    vec3 middle;
-    for (int axis = 0; axis < 3; ++axis) {
-        Pair eye = Pair(instance.eye_hi[axis], instance.eye_lo[axis]);
-        Pair w = Pair(instance.w0_hi[axis], instance.w0_lo[axis]);
-        Pair origin = Pair(patch.origin_hi[axis], patch.origin_lo[axis]);
-        middle[axis] = anchored(eye, w, ray.anchor, origin);
-    }
-    precise float per_scale = 1.0f / patch.scale;
-    vec3 axis_x = vector(patch.axis_x);
-    vec3 axis_y = vector(patch.axis_y);
-    vec3 axis_z = vector(patch.axis_z);
-    ray.origin = project(axis_x, axis_y, axis_z, middle + ray.anchor * across) * per_scale;
-    ray.direction = project(axis_x, axis_y, axis_z, w0 + across) * per_scale;
-    ray.past = ray.anchor - view.tau_ref;
-    // the patch's own arithmetic, |q| about 1, and one rounding of `past`
-    ray.slack = 4e-7f * (1.0f + length(middle) * per_scale) / length(ray.direction) + 1.2e-7f * abs(ray.past);
-    ray.pixel = instance.footprint * per_scale;
-    return ray;
-}
 
 // crossed(run) of format/kd_layout.h. `first_point` is the run's.
 bool kd_crossed(uint first_point, KdRun run, vec2 uv)
@@ -221,7 +171,7 @@ float as_near(PatchRay ray, Hit hit)
 bool in_range(PatchRay ray, float t, float blur, Hit hit)
 {
     float past = ray.past + t;
-    return t < kHuge && past > -view.tau_ref && past < hit.past + (as_near(ray, hit) + blur);
+    return t < kHuge && past > ray_begin() && past < hit.past + (as_near(ray, hit) + blur);
 }
 
 // Takes the root at t if it is in the face's domain, inside its trims and nearer than what was found. Of two hits
@@ -328,7 +278,7 @@ void native_hit(PatchRay ray, PatchRecord patch, FaceRecord face, uint kind, uin
     }
     // where rounding decides whether a ray meets a surface, what lies behind is not certain
     float from = ray.past - ray.slack + touch;
-    if (touch < kHuge && (from > -view.tau_ref || touch <= -kHuge))
+    if (touch < kHuge && (from > ray_begin() || touch <= -kHuge))
         hit.doubt = min(hit.doubt, from);
     for (int i = 0; i < 4; ++i) {
         if (!in_range(ray, roots[i], 0.0f, hit))
@@ -407,7 +357,7 @@ void offer_end(PatchRay ray, PatchRecord patch, FaceRecord face, NewtonPatch new
     vec2 uv_face = face_uv(patch, kKindBezier, root.uv);
     vec2 uv_blur = vec2(0.0f);
     float footprint = ray.pixel * (ray.anchor + root.t);
-    float off_by = more_than_hair(footprint, newton.rounding);
+    float off_by = kRaysCertify ? more_than_hair(footprint, newton.rounding) : 0.0f;
     // where weights may not stay positive beyond a side, it is not certain that the patch goes on
     bool unsure = on_patch && newton.rational && is_beyond_sides(root.uv);
     if (off_by > 0.0f) {
@@ -475,7 +425,7 @@ void bezier_hit(PatchRay ray, PatchRecord patch, FaceRecord face, LeafBox box, f
     if (local_floats > 0u)
         copy_control_points(patch, (degree_u + 1u) * (degree_v + 1u) * (newton.rational ? 4u : 3u));
     newton.planes = ray_planes(ray.origin, ray.direction);
-    newton.enough = last_residual(view.error_px * ray.pixel * abs(ray.anchor));
+    newton.enough = last_residual(view.error_px * ray.width);
     newton.rounding = patch_rounding(newton.degree_u, newton.degree_v);
     newton.work = 1u + bezier_iterations(degree_u, degree_v);
     if (has_feature(kFeatureStochastic)) {
@@ -612,17 +562,17 @@ void bezier_hit(PatchRay ray, PatchRecord patch, FaceRecord face, LeafBox box, f
         hit.doubt = min(hit.doubt, min(box_past, hit.past)); // it may lie a little before its box, on the next leaf
 }
 
-void leaf_hit(uint leaf, uint instance_index, FrameInstance instance, vec2 pixel, inout Hit hit)
+void leaf_hit(uint leaf, uint instance_index, FrameInstance instance, Ray whole_ray, inout Hit hit)
 {
     LeafRecord record = leaves[leaf];
     PatchRecord patch = patches[record.patch];
-    PatchRay ray = patch_ray(instance, patch, pixel);
+    PatchRay ray = patch_ray(instance, instance_index, patch, whole_ray);
     LeafBox box = decode_leaf(record);
     // a ray far from its patch has larger rounding
     float margin = kBoxMargin * (1.0f + length(ray.origin));
     BoxHit in_box = leaf_box_hit(box, ray.origin, ray.direction, margin);
     ++leaf_visits;
-    if (!in_box.hit || ray.past + in_box.far < -view.tau_ref - ray.slack ||
+    if (!in_box.hit || ray.past + in_box.far < ray_begin() - ray.slack ||
         ray.past + in_box.near > hit.past + as_near(ray, hit))
         return;
     uint kind = patch.shape & 0xffu;

@@ -35,6 +35,8 @@ struct LightView {
     float turn_sin[16];
 };
 
+TRIMRAY_CONST uint kMostLights = 16u;
+
 // LightRecord::kind, and kLightShadows beside it
 TRIMRAY_CONST uint kLightEye = 0u;
 TRIMRAY_CONST uint kLightDirectional = 1u;
@@ -58,7 +60,18 @@ struct WorldToPart {
     float scale;     // part units per unit of the top tree
 };
 
+// A hit as lights find it, kept while its light is gathered.
+struct LitPixel {
+    float place[3];
+    float normal[3]; // unit, on the eye's side
+    float to_eye[3]; // unit
+    float color[3];
+    float specular;
+    float pixel; // a pixel's width there; 0: the ray met nothing
+};
+
 #ifdef __cplusplus
+static_assert(sizeof(LitPixel) == 56);
 static_assert(sizeof(LightView) == 4 * 62);
 static_assert(sizeof(LightRecord) == 32);
 static_assert(sizeof(WorldToPart) == 52);

@@ -8,6 +8,7 @@
 
 #include "format/kd_layout.h"
 #include "shaders/frame_layout.h"
+#include "shaders/light_layout.h"
 // first: the formulas fetch through it, and they make `scalar`, a layout there, a type
 #include "shaders/scene_buffers.glsl"
 
@@ -18,6 +19,7 @@
 #include "shaders/shared/leaf_box.h"
 #include "shaders/shared/leaf_proof.h"
 #include "shaders/shared/leaf_start.h"
+#include "shaders/shared/light.h"
 #include "shaders/shared/precision.h"
 #include "shaders/shared/quadric.h"
 #include "shaders/shared/rim.h"
@@ -26,154 +28,17 @@
 #include "shaders/shared/trim_kd.h"
 #include "shaders/shared/trim_lookup.h"
 
+#include "shaders/ray_types.glsl"
+#include "shaders/eye_rays.glsl"
 #include "shaders/leaf_hit.glsl"
+#include "shaders/walk.glsl"
 #include "shaders/last_hits.glsl"
 
 #include "shaders/border_edges.glsl"
+#include "shaders/light.glsl"
+#include "shaders/work_counts.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
-
-// A ray for one tree: the point at tau = anchor, and the direction
-struct TreeRay {
-    vec3 origin;
-    vec3 inverse;
-    float anchor;
-};
-
-TreeRay top_ray(vec3 across)
-{
-    TreeRay ray;
-    ray.anchor = view.top_tau;
-    ray.origin = vector(view.top_origin) + view.top_tau * view.per_world_scale * across;
-    vec3 direction = (vector(view.w0) + across) * view.per_world_scale;
-    ray.inverse = vec3(safe_inverse(direction.x), safe_inverse(direction.y), safe_inverse(direction.z));
-    return ray;
-}
-
-TreeRay part_ray(FrameInstance instance, vec2 pixel)
-{
-    vec3 across = pixel.x * vector(instance.step_x) + pixel.y * vector(instance.step_y);
-    TreeRay ray;
-    ray.anchor = instance.node_tau;
-    ray.origin = vector(instance.node_origin) + instance.node_tau * across;
-    vec3 direction = vector(instance.w0_hi) + across;
-    ray.inverse = vec3(safe_inverse(direction.x), safe_inverse(direction.y), safe_inverse(direction.z));
-    return ray;
-}
-
-// A child that waits: its first tau, and its node or leaf
-struct Waiting {
-    float tau;
-    uint item;
-};
-
-Waiting waiting_child(BvhNode node, NodeRay ray, TreeRay tree_ray, int child, float tau_max)
-{
-    ChildHit hit = child_hit(node, ray, child, -tree_ray.anchor, tau_max - tree_ray.anchor);
-    bool exists = node.child[child] != kBvhEmpty;
-    return Waiting(exists && hit.hit ? hit.near + tree_ray.anchor : kHuge, node.child[child]);
-}
-
-void nearer_first(inout Waiting a, inout Waiting b)
-{
-    if (b.tau < a.tau) {
-        Waiting c = a;
-        a = b;
-        b = c;
-    }
-}
-
-Waiting stack[stack_size];
-uint stack_top = 0u;
-
-void push(Waiting waiting)
-{
-    if (waiting.tau < kHuge) {
-        stack[stack_top] = waiting;
-        ++stack_top;
-    }
-}
-
-void push_children(BvhNode node, TreeRay tree_ray, float tau_max)
-{
-    NodeRay ray = node_ray(node, tree_ray.origin, tree_ray.inverse);
-    Waiting a = waiting_child(node, ray, tree_ray, 0, tau_max);
-    Waiting b = waiting_child(node, ray, tree_ray, 1, tau_max);
-    Waiting c = waiting_child(node, ray, tree_ray, 2, tau_max);
-    Waiting d = waiting_child(node, ray, tree_ray, 3, tau_max);
-    nearer_first(a, b); // a sorting network of five comparisons
-    nearer_first(c, d);
-    nearer_first(a, c);
-    nearer_first(b, d);
-    nearer_first(b, c);
-    push(d);
-    push(c);
-    push(b);
-    push(a);
-    ++node_visits;
-}
-
-// No hit can be nearer than what begins beyond this: the nearest so far, and the rounding of a distance
-float hit_tau(Hit hit)
-{
-    float tau = view.tau_ref + hit.past;
-    return hit.past < kHuge ? tau + max(4.0f * kRounding * abs(tau), hit.slack) : kHuge;
-}
-
-// Walks the trees until nothing nearer can wait; the guess is searched before all others, and only then. Returns false
-// where the driver's loop limit would have cut it short.
-bool walk(vec2 pixel, vec3 across, Guess guess, inout Hit hit)
-{
-    const uint kNoPart = 0xffffffffu;
-    uint part_floor = kNoPart; // what the stack holds below is the top tree's
-    uint instance_index = 0u;
-    FrameInstance instance;
-    TreeRay ray = top_ray(across);
-    stack_top = 0u;
-    push(Waiting(0.0f, 0u));
-    bool guess_waits = has_feature(kFeatureReuse) && guess.leaf != kNoLeaf;
-    if (guess_waits)
-        push(Waiting(0.0f, kBvhLeaf | guess.instance));
-    while (stack_top > 0u) {
-        iterations = 1u;
-        if (part_floor != kNoPart && stack_top == part_floor) {
-            part_floor = kNoPart;
-            ray = top_ray(across);
-        }
-        --stack_top;
-        Waiting next = stack[stack_top];
-        float tau_max = hit_tau(hit);
-        if (next.tau <= tau_max) {
-            uint index = next.item & ~kBvhLeaf;
-            bool is_leaf = (next.item & kBvhLeaf) != 0u;
-            bool in_part = part_floor != kNoPart;
-            if (!is_leaf) {
-                if (in_part)
-                    push_children(part_nodes[instance.first_node + index], ray, tau_max);
-                else
-                    push_children(top_nodes[index], ray, tau_max);
-            } else if (!in_part) {
-                instance_index = index;
-                instance = instances[index];
-                ray = part_ray(instance, pixel);
-                part_floor = stack_top;
-                push(Waiting(next.tau, guess_waits ? kBvhLeaf | (guess.leaf - instance.first_leaf) : 0u));
-            } else {
-                uint leaf = instance.first_leaf + index;
-                bool is_guess = has_feature(kFeatureReuse) && leaf == guess.leaf && instance_index == guess.instance;
-                if (!is_guess || guess_waits)
-                    leaf_hit(leaf, instance_index, instance, pixel, hit);
-                guess_waits = false;
-            }
-        }
-        if (iteration_limit > 0u) {
-            group_iterations += subgroupMax(iterations);
-            if (group_iterations > iteration_limit || overrun)
-                return false;
-        }
-    }
-    return true;
-}
 
 // S_u x S_v of a Bezier patch; at a pole or along a degenerate side the one a little way inside
 vec3 bezier_normal(PatchRecord patch, vec2 uv)
@@ -199,10 +64,10 @@ vec3 bezier_normal(PatchRecord patch, vec2 uv)
 }
 
 // The normal in the world, outward as the face's orientation says, of any length
-vec3 world_normal(Hit hit, FrameInstance instance, PatchRecord patch, FaceRecord face, vec2 pixel)
+vec3 world_normal(Hit hit, FrameInstance instance, PatchRecord patch, FaceRecord face, Ray eye_ray)
 {
     uint kind = patch.shape & 0xffu;
-    PatchRay ray = patch_ray(instance, patch, pixel);
+    PatchRay ray = patch_ray(instance, hit.instance, patch, eye_ray);
     vec3 p = ray.origin + hit.t * ray.direction;
     vec3 n;
     if (kind == kKindBezier && has_kind(kKindBezier))
@@ -232,16 +97,16 @@ FramePixel miss_pixel(bool doubt)
     return pixel;
 }
 
-FramePixel hit_pixel(Hit hit, vec2 pixel, vec3 across)
+FramePixel hit_pixel(Hit hit, Ray eye_ray, uint band_pixel)
 {
     FrameInstance instance = instances[hit.instance];
     LeafRecord leaf = leaves[hit.leaf];
     PatchRecord patch = patches[leaf.patch];
     FaceRecord face = faces[patch.face];
-    vec3 direction = vector(view.w0) + across;
+    vec3 direction = vector(view.w0) + eye_ray.across;
     float stretch = length(direction);
     vec3 to_eye = direction / -stretch;
-    vec3 normal = world_normal(hit, instance, patch, face, pixel);
+    vec3 normal = world_normal(hit, instance, patch, face, eye_ray);
     float size = length(normal);
     normal = size > 0.0f ? normal / size : to_eye; // a surface without a normal faces the eye
     FramePixel result;
@@ -256,21 +121,16 @@ FramePixel hit_pixel(Hit hit, vec2 pixel, vec3 across)
         uint rgba = instance.color_rgba >> 24 != 0u ? instance.color_rgba : kDefaultColor;
         if ((face.flags & kFaceHasColor) != 0u)
             rgba = face.color_rgba;
-        vec3 color = shade(linear_color(rgba), normal, to_eye);
+        vec3 color;
+        if (has_feature(kFeatureLights)) {
+            LitPixel point = lit_pixel(eye_ray.pixel, hit.past, normal, to_eye, linear_color(rgba), kSpecular);
+            lit_pixels[band_pixel] = point;
+            color = light_without_rays(point);
+        } else
+            color = shade(linear_color(rgba), normal, to_eye);
         result.rgba = float[4](color.x, color.y, color.z, 1.0f);
     }
     return result;
-}
-
-// Adds a subgroup's sum to a count of two words
-void tally(uint count, uint amount)
-{
-    uint sum = subgroupAdd(amount);
-    if (subgroupElect() && sum > 0u) {
-        uint before = atomicAdd(counts[2u * count], sum);
-        if (before + sum < before)
-            atomicAdd(counts[2u * count + 1u], 1u);
-    }
 }
 
 void main()
@@ -284,7 +144,7 @@ void main()
     }
     if (active_here) {
         vec2 pixel = vec2(float(at.x) + 0.5f - view.middle[0], float(at.y + view.first_row) + 0.5f - view.middle[1]);
-        vec3 across = pixel.x * vector(view.step_x) + pixel.y * vector(view.step_y);
+        Ray eye_ray = Ray(pixel, pixel.x * vector(view.step_x) + pixel.y * vector(view.step_y));
         uint picture_pixel = (view.first_row + at.y) * view.width + at.x;
         Hit before = Hit(kHuge, 0.0f, vec2(0.0f), vec2(0.0f), 0xffffffffu, 0xffffffffu, kHuge, false, false, 0.0f);
         if (has_feature(kFeatureKept))
@@ -299,7 +159,7 @@ void main()
         bool complete;
         for (int attempt = 0; attempt < 2; ++attempt) {
             hit = before;
-            complete = walk(pixel, across, guess, hit);
+            complete = walk(eye_ray, guess, hit);
             if (!complete || !hit.back || rims_cut)
                 break;
             rims_cut = true;
@@ -312,15 +172,18 @@ void main()
                 hit = before;
         }
         if (has_feature(kFeatureReuse))
-            keep_hit(picture_pixel, hit, across);
+            keep_hit(picture_pixel, hit, eye_ray.across);
+        uint band_pixel = at.y * view.width + at.x;
         FramePixel result = miss_pixel(hit.doubt < kHuge);
         if (hit.past < kHuge)
-            result = hit_pixel(hit, pixel, across);
+            result = hit_pixel(hit, eye_ray, band_pixel);
+        else if (has_feature(kFeatureLights))
+            lit_pixels[band_pixel].pixel = 0.0f;
         if (!complete)
             result.status |= kPixelStopped;
         if (has_feature(kFeatureEdges))
-            edges[at.y * view.width + at.x] = hit.past < kHuge ? find_edges(hit, pixel) : uvec2(0u);
-        pixels[at.y * view.width + at.x] = result;
+            edges[band_pixel] = hit.past < kHuge ? find_edges(hit, eye_ray) : uvec2(0u);
+        pixels[band_pixel] = result;
     }
     if (has_feature(kFeatureCount)) {
         tally(kCountRays, active_here && view.alone == 0u ? 1u : 0u);

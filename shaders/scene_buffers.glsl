@@ -10,7 +10,7 @@ layout(scalar, set = 0, binding = kBindCells) readonly buffer Cells { uint cells
 layout(scalar, set = 0, binding = kBindCellEntries) readonly buffer CellEntries { CellEntry cell_entries[]; };
 layout(scalar, set = 0, binding = kBindTrimPoints) readonly buffer TrimPoints { vec2 trim_points[]; };
 layout(scalar, set = 0, binding = kBindSdfWords) readonly buffer SdfWords { uint sdf_words[]; };
-layout(scalar, set = 0, binding = kBindPixels) writeonly buffer Pixels { FramePixel pixels[]; };
+layout(scalar, set = 0, binding = kBindPixels) buffer Pixels { FramePixel pixels[]; };
 layout(scalar, set = 0, binding = kBindCounts) buffer Counts { uint counts[]; };
 layout(scalar, set = 0, binding = kBindRetries) readonly buffer Retries { uint retries[]; };
 layout(scalar, set = 0, binding = kBindBorders) readonly buffer Borders { uint border_words[]; };
@@ -22,6 +22,19 @@ layout(scalar, set = 0, binding = kBindKdFaces) readonly buffer KdFaces { KdFace
 layout(scalar, set = 0, binding = kBindKept) buffer KeptHits { KeptHit kept_hits[]; };
 layout(scalar, set = 0, binding = kBindLastHits) readonly buffer LastHits { LastHit last_hits[]; };
 layout(scalar, set = 0, binding = kBindNextHits) writeonly buffer NextHits { LastHit next_hits[]; };
+layout(scalar, set = 0, binding = kBindLights) readonly buffer Lights
+{
+    LightView light_view;
+    LightRecord light_records[kMostLights];
+    vec2 light_samples[];
+};
+layout(scalar, set = 0, binding = kBindToPart) readonly buffer ToPart { WorldToPart to_part[]; };
+layout(scalar, set = 0, binding = kBindLitPixels) buffer LitPixels { LitPixel lit_pixels[]; };
+layout(scalar, set = 0, binding = kBindStopped) buffer Stopped
+{
+    uint stopped_count;
+    uint stopped[];
+};
 layout(scalar, push_constant) uniform View { FrameView view; };
 
 // Specialised to what the pack holds and the frame asks for: what is false here costs no instruction.

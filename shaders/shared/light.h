@@ -45,11 +45,31 @@ FN real start_distance(real3 place, real slack)
     return slack + (kStartRoundings * kRounding) * (1.0f + length(place)); // the scene reaches about 1
 }
 
+// Rounding of s where such a ray meets a patch: `speed` is the length of its direction in the patch's units, `nearest`
+// how far it passes from the patch's middle in these, `from` its s there
+FN real free_rounding(real nearest, real speed, real from, real place)
+{
+    return (8.0f * kRounding) * ((1.0f + nearest) / speed + abs(from) + place);
+}
+
 // The light that reaches every point: from all around and, more, from above. normal and to_eye unit
 FN real sky_light(real3 normal, real3 to_eye)
 {
     real up = select(dot(normal, to_eye) < 0.0f, -normal.z, normal.z);
     return kAmbient + kSky * (0.5f + 0.5f * up);
+}
+
+// The point of a sample's disc that a pixel takes: turned by one of kTurns angles
+FN real2 turned_sample(real2 at, real cosine, real sine)
+{
+    return real2(cosine * at.x - sine * at.y, sine * at.x + cosine * at.y);
+}
+
+// The way from a ray's origin to a light, of any length: to the middle of its disc, or to a sample's point of it
+FN real3 way_to_disc(real3 middle, scalar radius, real2 at)
+{
+    Tangents across = tangents_of(middle * (1.0f / max(length(middle), real(1e-20f))));
+    return middle + (across.u * at.x + across.v * at.y) * real(radius);
 }
 
 // What of a light of strength 1 leaves towards the eye. All unit; the normal on the eye's side.
