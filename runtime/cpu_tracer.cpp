@@ -105,7 +105,7 @@ private:
         std::optional<LightJob> light;
         if (options.shade && has_lights(options.look)) {
             const ViewRays picture{std::to_array(view.eye_mm), std::to_array(view.w0), std::to_array(view.step_x),
-                                      std::to_array(view.step_y), view.tau_ref};
+                                   std::to_array(view.step_y), view.tau_ref};
             light.emplace(LightJob{frame_lights(scene_->pack.image, options, picture), to_part_});
             job.light = &*light;
         }
