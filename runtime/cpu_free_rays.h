@@ -11,9 +11,11 @@
 #include "runtime/cpu_leaf_hits.h"
 #include "runtime/cpu_write.h"
 #include "shaders/light_layout.h"
+#include "shaders/section_layout.h"
 #include "shaders/shared/bvh_node.h"
 #include "shaders/shared/leaf_box.h"
 #include "shaders/shared/light.h"
+#include "shaders/shared/section.h"
 
 #include <array>
 
@@ -31,6 +33,7 @@ struct FreePacket {
 /// What a packet's rays are for a patch: `at` is s.
 struct FreeRays {
     static constexpr bool kCertifies = false;
+    static constexpr bool kCollects = false;
     mask alive;
     real from; // s at t = 0
     real rounding;
@@ -44,29 +47,42 @@ struct FreeRays {
     HWY_ATTR real footprint(real) const { return real(pixel); }
 };
 
-class FreeTracer {
+/// Rays: FreeRays, or what is made from one.
+template <class Rays>
+class FreeWalk {
 public:
-    FreeTracer(const BlockJob& job, BlockScratch& scratch, const FetchSource& source, WorkCounts& work)
+    FreeWalk(const BlockJob& job, BlockScratch& scratch, const FetchSource& source, WorkCounts& work)
         : job_(job), scratch_(scratch), work_(work), image_(job.scene.image), leaf_hits_(job, scratch, source, work)
     {
-        leaf_hits_.rims_cut = true;
+        FreeMiddles& kept = scratch.free_middles;
+        kept.middle.resize(FreeMiddles::kCount);
+        kept.leaf.resize(FreeMiddles::kCount, ~0u);
     }
 
-    /// The nearest hits; hit.best is s.
-    HWY_ATTR PacketHit closest(const FreePacket& rays)
+    /// Meets the leaves that the rays pass before their hits; with `any` a ray ends at its first hit found. make_rays
+    /// turns what a packet is for a patch into Rays.
+    template <class MakeRays>
+    HWY_ATTR HWY_NOINLINE PacketHit trace(const FreePacket& rays, bool any, MakeRays make_rays)
     {
         PacketHit hit;
-        trace(rays, false, hit);
+        hit.best = select(rays.alive, rays.reach, real(-kHuge));
+        hit.leaf = integer(~0u);
+        hit.instance = integer(~0u);
+        hit.uv_face = real2(real(0.0f), real(0.0f));
+        hit.normal = real3(real(0.0f), real(0.0f), real(1.0f));
+        hit.back = mask(false);
+        hit.doubt = real(kHuge);
+        work_.free_rays += lane_count(rays.alive);
+        recent_.clear();
+        const auto enter = [&](uint instance) HWY_ATTR { meet_instance(rays, any, instance, make_rays, hit); };
+        if (image_.instances.size() == 1)
+            enter(0);
+        else if (!image_.top_nodes.empty())
+            walk(image_.top_nodes.data(), tree_packet(rays.origin, rays.direction), hit, enter);
         return hit;
     }
 
-    /// The rays that anything stops.
-    HWY_ATTR mask stopped(const FreePacket& rays)
-    {
-        PacketHit hit;
-        trace(rays, true, hit);
-        return rays.alive && hit.leaf != integer(~0u);
-    }
+    bool& rims_cut() { return leaf_hits_.rims_cut; }
 
 private:
     static constexpr int kMostWaiting = 3 * int(kMaxBvhDepth) + 2; // a visit takes one and leaves up to four
@@ -80,44 +96,29 @@ private:
         return {origin, real3(safe_inverse(direction.x), safe_inverse(direction.y), safe_inverse(direction.z))};
     }
 
-    HWY_ATTR HWY_NOINLINE void trace(const FreePacket& rays, bool any, PacketHit& hit)
-    {
-        hit.best = select(rays.alive, rays.reach, real(-kHuge));
-        hit.leaf = integer(~0u);
-        hit.instance = integer(~0u);
-        hit.uv_face = real2(real(0.0f), real(0.0f));
-        hit.normal = real3(real(0.0f), real(0.0f), real(1.0f));
-        hit.back = mask(false);
-        hit.doubt = real(kHuge);
-        work_.free_rays += lane_count(rays.alive);
-        recent_.clear();
-        const auto enter = [&](uint instance) HWY_ATTR { meet_instance(rays, any, instance, hit); };
-        if (image_.instances.size() == 1)
-            enter(0);
-        else if (!image_.top_nodes.empty())
-            walk(image_.top_nodes.data(), tree_packet(rays.origin, rays.direction), hit, enter);
-    }
-
-    HWY_ATTR void meet_instance(const FreePacket& rays, bool any, uint instance, PacketHit& hit)
+    template <class MakeRays>
+    HWY_ATTR void meet_instance(const FreePacket& rays, bool any, uint instance, MakeRays& make_rays, PacketHit& hit)
     {
         const PartRecord& part = image_.parts[image_.instances[instance].part];
         if (part.node_count == 0)
             return;
-        const WorldToPart& to = job_.light->to_part[instance];
+        const WorldToPart& to = job_.to_part[instance];
         const scalar3 row_x(to.row_x[0], to.row_x[1], to.row_x[2]), row_y(to.row_y[0], to.row_y[1], to.row_y[2]),
             row_z(to.row_z[0], to.row_z[1], to.row_z[2]);
         const real3 origin =
             project(row_x, row_y, row_z, rays.origin) + scalar3(to.offset[0], to.offset[1], to.offset[2]);
         const real3 direction = project(row_x, row_y, row_z, rays.direction);
         walk(image_.part_nodes.data() + part.first_node, tree_packet(origin, direction), hit, [&](uint leaf) HWY_ATTR {
-            meet_leaf(rays, part.first_leaf + leaf, instance, origin, direction, to.scale * rays.footprint, hit);
+            meet_leaf(rays, part.first_leaf + leaf, instance, origin, direction, to.scale * rays.footprint, make_rays,
+                      hit);
             if (any)
                 hit.best = select(hit.leaf != integer(~0u), real(-kHuge), hit.best);
         });
     }
 
+    template <class MakeRays>
     HWY_ATTR void meet_leaf(const FreePacket& rays, uint leaf_id, uint instance, real3 part_origin,
-                            real3 part_direction, float part_footprint, PacketHit& hit)
+                            real3 part_direction, float part_footprint, MakeRays& make_rays, PacketHit& hit)
     {
         constexpr float kBoxMargin = 1e-6f; // patch units: as for the eye's rays
         const LeafRecord& leaf = image_.leaves[leaf_id];
@@ -141,7 +142,8 @@ private:
         if (!any_lane(alive) || (job_.scene.shared_patch[leaf.patch] && recent_.has(instance, leaf.patch)))
             return;
         work_.free_leaf_visits += lane_count(alive);
-        const FreeRays free{rays.alive && hit.best > -kHuge, from, rounding, part_footprint * per_scale};
+        const Rays free =
+            make_rays(FreeRays{rays.alive && hit.best > -kHuge, from, rounding, part_footprint * per_scale});
         FreeMiddles& kept = scratch_.free_middles;
         const size_t slot = leaf_id % FreeMiddles::kCount;
         uint8_t has_middle = kept.leaf[slot] == leaf_id;
@@ -193,8 +195,46 @@ private:
     BlockScratch& scratch_;
     WorkCounts& work_;
     const PackImage& image_;
-    LeafHits<FreeRays> leaf_hits_;
+    LeafHits<Rays> leaf_hits_;
     RecentPatches recent_;
+};
+
+/// Hits of rays from anywhere, within what section planes leave.
+class FreeTracer {
+public:
+    FreeTracer(const BlockJob& job, BlockScratch& scratch, const FetchSource& source, WorkCounts& work)
+        : section_(job.section), walk_(job, scratch, source, work)
+    {
+        walk_.rims_cut() = true;
+    }
+
+    /// The nearest hits; hit.best is s.
+    HWY_ATTR PacketHit closest(const FreePacket& rays) { return trace(rays, false); }
+
+    /// The rays that anything stops.
+    HWY_ATTR mask stopped(const FreePacket& rays) { return rays.alive && trace(rays, true).leaf != integer(~0u); }
+
+private:
+    HWY_ATTR PacketHit trace(FreePacket rays, bool any)
+    {
+        if (section_)
+            rays.reach = cut_free_ray(*section_, rays.origin, rays.direction, rays.reach);
+        return walk_.trace(rays, any, [](const FreeRays& free) HWY_ATTR { return free; });
+    }
+
+    /// Where a ray that begins in what is left leaves it, if that is before `reach`.
+    static HWY_ATTR real cut_free_ray(const SectionView& section, real3 origin, real3 direction, real reach)
+    {
+        for (uint i = 0; i < section.count; ++i) {
+            const SectionPlaneView& plane = section.planes[i];
+            const scalar3 normal(plane.normal[0], plane.normal[1], plane.normal[2]);
+            reach = cut_reach(dot(real3(normal), origin) - plane.offset, dot(real3(normal), direction), reach);
+        }
+        return reach;
+    }
+
+    const SectionView* section_;
+    FreeWalk<FreeRays> walk_;
 };
 
 SHARED_CLOSE

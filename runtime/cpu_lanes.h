@@ -7,6 +7,7 @@
 #include "runtime/edge_lines.h"
 #include "runtime/frame_effects.h"
 #include "runtime/light_view.h"
+#include "runtime/section_view.h"
 #include "runtime/stochastic_frames.h"
 #include "runtime/tracer.h"
 
@@ -88,12 +89,6 @@ struct StochasticJob {
     KeptHits* kept;             // null: there is one frame alone
 };
 
-/// What lights a picture, where that is more than the light at the eye.
-struct LightJob {
-    FrameLights frame;
-    std::span<const WorldToPart> to_part; // by instance
-};
-
 struct BlockJob {
     const CpuScene& scene;
     const View& view;
@@ -106,7 +101,10 @@ struct BlockJob {
     bool record_trim_queries = false;
     const EdgeJob* edges = nullptr;            // null: nobody asks for borders
     const StochasticJob* stochastic = nullptr; // null: ClosestPolicy::Certified
-    const LightJob* light = nullptr;           // null: the light at the eye alone
+    const FrameLights* light = nullptr;        // null: the light at the eye alone
+    const SectionView* section = nullptr;      // null: nothing is cut away
+    const PlaceView* places = nullptr;         // where there is light or a section
+    std::span<const WorldToPart> to_part = {}; // by instance, where rays begin elsewhere than at the eye
 };
 
 /// Traces the block into `frame`, whose arrays have their size.

@@ -57,6 +57,7 @@ private:
 /// The pixels' rays from the eye, as one patch has them: `at` is tau - tau_ref in mm.
 struct EyeRays {
     static constexpr bool kCertifies = true; // what stays open of them is told in PacketHit::doubt
+    static constexpr bool kCollects = false;
     const PatchView& view;
     mask alive;
     float begin; // `at` of the eye
@@ -70,7 +71,14 @@ struct EyeRays {
     HWY_ATTR real footprint(real t) const { return view.pixel * (view.tau + t); }
 };
 
-/// Rays: what EyeRays has.
+/// Rays from the eye that begin on their way, each elsewhere.
+struct CutRays : EyeRays {
+    real begin_at;
+    HWY_ATTR mask is_ahead(real at) const { return at > begin_at; }
+};
+
+/// Rays: what EyeRays has, and where kCollects is true, collect(taken, at, leaves, tolerance_mm): then every hit goes
+/// there and none is the nearest.
 template <class Rays>
 class LeafHits {
 public:
@@ -390,6 +398,8 @@ private:
             if (!any_lane(taken))
                 return;
         }
+        if constexpr (Rays::kCollects)
+            return target.rays.collect(taken, at, meets_back(target, normal), target.at, target.face.tolerance_mm);
         mask back(false);
         if (target.rim) {
             back = meets_back(target, normal);

@@ -18,22 +18,15 @@ SHARED_OPEN
 class PacketLight {
 public:
     PacketLight(const BlockJob& job, BlockScratch& scratch, const FetchSource& source, WorkCounts& work)
-        : job_(job), view_(job.light->frame.view), rays_(job, scratch, source, work)
+        : job_(job), view_(job.light->view), places_(*job.places), rays_(job, scratch, source, work)
     {
-        FreeMiddles& kept = scratch.free_middles;
-        kept.middle.resize(FreeMiddles::kCount);
-        kept.leaf.resize(FreeMiddles::kCount, ~0u);
     }
 
     /// The colours that leave the hits of the eye's rays.
-    HWY_ATTR HWY_NOINLINE real3 lit(const Packet& packet, const PacketHit& hit, const LitPoints& points)
+    HWY_ATTR HWY_NOINLINE real3 lit(const Packet& packet, const LitPoints& points)
     {
-        const real3 along = vector(view_.along) + packet.x * vector(view_.along_x) + packet.y * vector(view_.along_y);
-        const real past = select(points.alive, hit.best, real(0.0f));
-        const real3 place =
-            vector(view_.place) + packet.x * vector(view_.place_x) + packet.y * vector(view_.place_y) + along * past;
-        const real pixel = abs(past + view_.tau_ref) * view_.pixel;
-        return lit_at(place, pixel, points);
+        const real past = select(points.alive, points.past, real(0.0f));
+        return lit_at(places_.at(packet, past), places_.footprint(past), points);
     }
 
 private:
@@ -47,7 +40,7 @@ private:
         rays.footprint = -largest_lane(select(points.alive, -pixel, real(-kHuge)));
         real3 sum =
             points.color * (sky_light(points.normal, points.to_eye) * view_.sky * open_sky(points, normal, rays));
-        for (const LightRecord& light : job_.light->frame.lights)
+        for (const LightRecord& light : job_.light->lights)
             sum = sum + from_light(light, points, normal, rays);
         return sum;
     }
@@ -62,7 +55,7 @@ private:
             return real(1.0f);
         rays.alive = points.alive;
         rays.reach = real(view_.occlusion_reach);
-        const float* disc = job_.light->frame.samples.data() + 2 * view_.light_samples;
+        const float* disc = job_.light->samples.data() + 2 * view_.light_samples;
         real open(0.0f);
         for (uint i = 0; i < count; ++i) {
             const real2 at = turned(disc[2 * i], disc[2 * i + 1]);
@@ -84,7 +77,7 @@ private:
         for (uint i = 0; i < count; ++i) {
             real3 way = middle;
             if ((light.kind & kLightSoft) != 0) {
-                const float* disc = job_.light->frame.samples.data() + 2 * i;
+                const float* disc = job_.light->samples.data() + 2 * i;
                 way = way_to_disc(middle, light.radius, turned(disc[0], disc[1]));
             }
             const real far = length(way);
@@ -113,6 +106,7 @@ private:
 
     const BlockJob& job_;
     const LightView& view_;
+    const PixelPlaces places_;
     FreeTracer rays_;
 };
 

@@ -9,6 +9,7 @@
 #define TRIMRAY_CPU_PACKET_H
 #endif
 
+#include "runtime/cpu_caps.h"
 #include "runtime/cpu_edges.h"
 #include "runtime/cpu_fetch.h"
 #include "runtime/cpu_lanes.h"
@@ -22,9 +23,12 @@
 #include <algorithm>
 #include <limits>
 #include <optional>
+#include <type_traits>
 
 SHARED_OPEN
 
+/// Rays: EyeRays, or CutRays where section planes leave a part of each.
+template <class Rays>
 class BlockTracer {
 public:
     BlockTracer(const BlockJob& job, BlockScratch& scratch, Frame& frame, WorkCounts& work)
@@ -34,6 +38,8 @@ public:
     {
         if (job.light)
             light_.emplace(job, scratch, source_, work);
+        if constexpr (kCut)
+            caps_.emplace(job, scratch, source_, work);
     }
 
     HWY_ATTR void trace(const Block& block)
@@ -64,12 +70,13 @@ public:
                         packet.x = load(offset_x) + real(float(x));
                         packet.y = load(offset_y) + real(float(y));
                         packet.alive = packet.x < float(tile.x1) - middle_x && packet.y < float(tile.y1) - middle_y;
+                        if constexpr (kCut)
+                            span_ = caps_->span(packet);
                         kept_ = keeps ? &job_.stochastic->kept->of_packet(x, y) : nullptr;
                         PacketHit hit = trace_twice(packet, pixel_rect({x, y, x + 4, y + 4}));
                         if (keeps)
                             keep_nearer(hit, packet.alive, *kept_);
-                        write_packet(job_, packet, hit, light_ ? &*light_ : nullptr, x - block.x0, y - strip_y0,
-                                     scratch_.strip, work_);
+                        write(packet, hit, x - block.x0, y - strip_y0);
                         if (has_borders)
                             edges_.find(packet, hit, x, y, &scratch_.strip.rgba[y - strip_y0][4 * (x - block.x0)]);
                     }
@@ -87,6 +94,8 @@ public:
     }
 
 private:
+    static constexpr bool kCut = std::is_same_v<Rays, CutRays>;
+
     PixelRect pixel_rect(const Block& block) const
     {
         const float x = 0.5f * float(job_.width), y = 0.5f * float(job_.height);
@@ -119,6 +128,19 @@ private:
         }
     }
 
+    /// Puts the packet's pixels at (x, y) of the strip. A cap hides the hit behind it.
+    HWY_ATTR void write(const Packet& packet, PacketHit& hit, uint32_t x, uint32_t y)
+    {
+        PacketLight* const light = light_ ? &*light_ : nullptr;
+        if constexpr (!kCut) {
+            write_packet(job_, packet, hit, nullptr, light, x, y, scratch_.strip, work_);
+        } else {
+            const PacketCaps caps = caps_->find(packet, span_, hit);
+            write_packet(job_, packet, hit, &caps, light, x, y, scratch_.strip, work_);
+            hit.best = select(caps.here, real(kHuge), hit.best);
+        }
+    }
+
     /// A rim's back counts as a surface first, for few rays meet one: where it is what they see they are traced again.
     HWY_ATTR PacketHit trace_twice(const Packet& packet, const PixelRect& rect)
     {
@@ -141,6 +163,10 @@ private:
         hit.back = mask(false);
         hit.doubt = real(job_.stochastic ? -kHuge : kHuge); // plain Newton claims nothing
         float farthest = kHuge;
+        if constexpr (kCut) {
+            hit.best = select(packet.alive && span_.begin < span_.end, min(span_.end, hit.best), real(-kHuge));
+            farthest = largest_lane(hit.best);
+        }
         if (kept_ != nullptr) {
             load_kept(*kept_, packet.alive, hit);
             farthest = largest_lane(hit.best);
@@ -159,6 +185,8 @@ private:
                     farthest = largest_lane(hit.best);
             }
         }
+        if constexpr (kCut)
+            hit.best = select(hit.leaf == integer(~0u), real(kHuge), hit.best);
         return hit;
     }
 
@@ -182,8 +210,12 @@ private:
         const scalar3 w0(view.w0[0], view.w0[1], view.w0[2]);
         const LeafAt at{candidate.leaf, candidate.instance, &scratch_.leaf_middles[candidate_index],
                         &scratch_.has_middle[candidate_index]};
+        const real3 origin = middle + across * real(view.tau), direction = w0 + across;
         const EyeRays rays{view, packet.alive, -float(job_.view.tau_ref)};
-        return leaf_hits_.intersect(rays, at, middle + across * real(view.tau), w0 + across, hit);
+        if constexpr (kCut)
+            return leaf_hits_.intersect({rays, span_.begin}, at, origin, direction, hit);
+        else
+            return leaf_hits_.intersect(rays, at, origin, direction, hit);
     }
 
     const BlockJob& job_;
@@ -192,9 +224,11 @@ private:
     WorkCounts& work_;
     const PackImage& image_;
     const FetchSource source_;
-    LeafHits<EyeRays> leaf_hits_;
+    LeafHits<Rays> leaf_hits_;
     EdgeFinder edges_;
     std::optional<PacketLight> light_;
+    std::optional<CapFinder> caps_;
+    CutSpan span_; // of the packet at hand, where kCut
     size_t tile_count_ = 0;
     RecentPatches recent_;
     KeptPacket* kept_ = nullptr; // of the packet at hand, where hits are kept from frame to frame

@@ -3,6 +3,7 @@
 #include "runtime/frame_effects.h"
 #include "runtime/frame_size.h"
 #include "runtime/light_view.h"
+#include "runtime/section_view.h"
 #include "runtime/thread_clock.h"
 #include "runtime/trace_one.h"
 #include "runtime/tracer.h"
@@ -47,7 +48,11 @@ public:
         const bool asks_borders = edge_query(options).any() && has_effects(options);
         if (const Status lights = check_lights(options.look); !lights.ok())
             return lights.error();
-        if (options.shade && has_free_rays(options.look) && to_part_.empty())
+        if (const Status section = check_section(options.look.section); !section.ok())
+            return section.error();
+        const bool asks_free_rays =
+            (options.shade && has_light_rays(options.look)) || !options.look.section.planes.empty();
+        if (asks_free_rays && to_part_.empty())
             to_part_ = world_to_part(scene_->pack.image);
         if (asks_borders && !border_cells_)
             border_cells_ = make_border_cells(scene_->pack.image);
@@ -91,7 +96,7 @@ private:
         View view = make_view(cpu_scene_->image, rays, options.width, options.height);
         const std::vector<uint8_t> outside = seen_from_outside(*cpu_scene_, rays.eye);
         for (size_t i = 0; i < outside.size(); ++i)
-            view.instances[i].outside = outside[i] != 0;
+            view.instances[i].outside = outside[i] != 0 && options.look.section.planes.empty(); // it shows the inside
         BlockJob job{*cpu_scene_, view, options.width, options.height, trim, options.shade, options.error_px};
         if (trim == TrimMode::Kd)
             job.kd = &*cpu_scene_->kd_trims();
@@ -102,13 +107,20 @@ private:
         const StochasticJob stochastic{start_of_frame(frame_number), keeps_hits(options) ? &kept_ : nullptr};
         if (options.closest == ClosestPolicy::Stochastic)
             job.stochastic = &stochastic;
-        std::optional<LightJob> light;
-        if (options.shade && has_lights(options.look)) {
-            const ViewRays picture{std::to_array(view.eye_mm), std::to_array(view.w0), std::to_array(view.step_x),
-                                   std::to_array(view.step_y), view.tau_ref};
-            light.emplace(LightJob{frame_lights(scene_->pack.image, options, picture), to_part_});
-            job.light = &*light;
-        }
+        const bool is_lit = options.shade && has_lights(options.look), is_cut = !options.look.section.planes.empty();
+        const ViewRays picture{std::to_array(view.eye_mm), std::to_array(view.w0), std::to_array(view.step_x),
+                               std::to_array(view.step_y), view.tau_ref};
+        const PackImage& image = scene_->pack.image;
+        const PlaceView places = place_view(image, picture);
+        const FrameLights lights = is_lit ? frame_lights(image, options) : FrameLights{};
+        const SectionView section = is_cut ? section_view(image, options.look.section, picture) : SectionView{};
+        if (is_lit || is_cut)
+            job.places = &places;
+        if (is_lit)
+            job.light = &lights;
+        if (is_cut)
+            job.section = &section;
+        job.to_part = to_part_;
         const bool effects = has_effects(options);
         std::optional<BlockLineDrawer> drawer;
         std::optional<EdgeJob> edges;

@@ -36,6 +36,37 @@ struct Packet {
     mask alive;
 };
 
+/// Where points of the pixels' rays are in the top tree's units.
+class PixelPlaces {
+public:
+    explicit PixelPlaces(const PlaceView& view) : view_(view) {}
+
+    HWY_ATTR real3 at(const Packet& packet, real past) const
+    {
+        return vector(view_.place) + packet.x * vector(view_.place_x) + packet.y * vector(view_.place_y) +
+               along(packet) * past;
+    }
+    /// The rays' direction: units a mm of tau.
+    HWY_ATTR real3 along(const Packet& packet) const
+    {
+        return vector(view_.along) + packet.x * vector(view_.along_x) + packet.y * vector(view_.along_y);
+    }
+    /// A pixel's width.
+    HWY_ATTR real footprint(real past) const { return abs(past + view_.tau_ref) * view_.pixel; }
+
+private:
+    static scalar3 vector(const float (&v)[3]) { return scalar3(v[0], v[1], v[2]); }
+
+    const PlaceView& view_;
+};
+
+/// A face's colour, linear light.
+static inline const float* color_of(const BlockJob& job, uint face, uint instance)
+{
+    const bool own = (job.scene.image.faces[face].flags & kFaceHasColor) != 0;
+    return own ? job.scene.face_color[face].data() : job.scene.instance_color[instance].data();
+}
+
 /// What the hits look like in the world, lane by lane.
 struct PacketShading {
     real3 normal; // outward, any length
@@ -78,8 +109,7 @@ FN real3 to_world(const float (&m)[3][3], real3 n)
         const scalar3 z(patch.axis_z[0], patch.axis_z[1], patch.axis_z[2]);
         const real3 in_part = combine(x, y, z, hit.normal * real(turn));
         out.normal = select(here, to_world(job.view.instances[instance_id].normal, in_part), out.normal);
-        const float* color = (face.flags & kFaceHasColor) != 0 ? job.scene.face_color[patch.face].data()
-                                                               : job.scene.instance_color[instance_id].data();
+        const float* color = color_of(job, patch.face, instance_id);
         out.color = select(here, real3(scalar3(color[0], color[1], color[2])), out.color);
         const float lo[2] = {float(face.domain_lo[0]), float(face.domain_lo[1])};
         const float size[2] = {float(face.domain_hi[0] - face.domain_lo[0]),
@@ -89,6 +119,25 @@ FN real3 to_world(const float (&m)[3][3], real3 n)
         out.face = select(here, integer(patch.face), out.face);
     }
     return out;
+}
+
+/// What closes the cut solids in a packet's pixels (runtime/cpu_caps.h).
+struct PacketCaps {
+    mask here;
+    mask doubtful; // it is not certain whether there is one
+    real past;     // PacketHit::best
+    real3 normal;  // unit, out of the solid
+    real3 color;
+    real2 uv; // mm along the plane
+    integer plane, instance;
+};
+
+[[maybe_unused]] static HWY_ATTR void show_caps(const PacketCaps& caps, PacketShading& shading)
+{
+    shading.normal = select(caps.here, caps.normal, shading.normal);
+    shading.color = select(caps.here, caps.color, shading.color);
+    shading.uv_file = select(caps.here, caps.uv, shading.uv_file);
+    shading.face = select(caps.here, integer(kCapFace) - caps.plane, shading.face);
 }
 
 /// A packet's pixels as they lie in a frame, 4 a row.
@@ -104,6 +153,7 @@ struct PacketPixels {
 
 /// A packet's hits as lights find them.
 struct LitPoints {
+    real past;    // PacketHit::best
     real3 normal; // unit, outward
     real3 to_eye; // unit
     real3 color;
@@ -170,10 +220,11 @@ HWY_INLINE void copy_to_strip(const PacketPixels& pixels, uint32_t x, uint32_t y
     }
 }
 
-/// Light: PacketLight (runtime/cpu_light.h); null where there is the light at the eye alone.
+/// Light: PacketLight (runtime/cpu_light.h); null where there is the light at the eye alone. Caps are hits without a
+/// leaf; null where there are no section planes.
 template <class Light>
-HWY_ATTR void write_packet(const BlockJob& job, const Packet& packet, const PacketHit& hit, Light* light, uint32_t x,
-                           uint32_t y, Strip& strip, WorkCounts& work)
+HWY_ATTR void write_packet(const BlockJob& job, const Packet& packet, const PacketHit& hit, const PacketCaps* caps,
+                           Light* light, uint32_t x, uint32_t y, Strip& strip, WorkCounts& work)
 {
     const mask hits = packet.alive && hit.best < kHuge;
     const uint hit_lanes = lane_bits(hits);
@@ -186,7 +237,9 @@ HWY_ATTR void write_packet(const BlockJob& job, const Packet& packet, const Pack
         copy_to_strip(kMissedPixels, x, y, strip);
         return;
     }
-    const PacketShading shading = shade_leaves(job, hit, hit_lanes);
+    PacketShading shading = shade_leaves(job, hit, caps ? hit_lanes & ~lane_bits(caps->here) : hit_lanes);
+    if (caps)
+        show_caps(*caps, shading);
     const View& view = job.view;
     const scalar3 w0(float(view.w0[0]), float(view.w0[1]), float(view.w0[2]));
     const scalar3 step_x(float(view.step_x[0]), float(view.step_x[1]), float(view.step_x[2]));
@@ -201,7 +254,7 @@ HWY_ATTR void write_packet(const BlockJob& job, const Packet& packet, const Pack
     // a surface without a normal faces the eye
     const real3 to_eye = along * (-1.0f / speed);
     normal = select(has_normal, normal, to_eye);
-    const real3 color = light ? light->lit(packet, hit, {normal, to_eye, shading.color, real(kSpecular), hits})
+    const real3 color = light ? light->lit(packet, {hit.best, normal, to_eye, shading.color, real(kSpecular), hits})
                               : shade(shading.color, normal, to_eye);
     const mask certified = hit.doubt >= kHuge || hit.doubt > hit.best;
 

@@ -103,7 +103,7 @@ bool has_lights(const SceneLook& look)
     return !look.lights.empty() || look.occlusion.samples > 0 || look.sky;
 }
 
-bool has_free_rays(const SceneLook& look)
+bool has_light_rays(const SceneLook& look)
 {
     return look.occlusion.samples > 0 ||
            std::any_of(look.lights.begin(), look.lights.end(), [](const Light& light) { return light.shadows; });
@@ -134,12 +134,10 @@ Status check_lights(const SceneLook& look)
     return Done{};
 }
 
-FrameLights frame_lights(const PackImage& image, const RenderOptions& options, const ViewRays& rays)
+PlaceView place_view(const PackImage& image, const ViewRays& rays)
 {
-    const SceneLook& look = options.look;
     const double per_scale = 1 / image.world_scale_mm;
-    FrameLights out{};
-    LightView& view = out.view;
+    PlaceView view{};
     Vec3 place;
     for (size_t i = 0; i < 3; ++i)
         place[i] = (rays.eye_mm[i] + rays.tau_ref * rays.w0[i] - image.world_origin_mm[i]) * per_scale;
@@ -151,6 +149,16 @@ FrameLights frame_lights(const PackImage& image, const RenderOptions& options, c
     store(scaled(rays.step_y, per_scale), view.along_y);
     view.tau_ref = float(rays.tau_ref);
     view.pixel = float(std::hypot(rays.step_x[0], rays.step_x[1], rays.step_x[2]) * per_scale);
+    view.per_mm = float(per_scale);
+    return view;
+}
+
+FrameLights frame_lights(const PackImage& image, const RenderOptions& options)
+{
+    const SceneLook& look = options.look;
+    const double per_scale = 1 / image.world_scale_mm;
+    FrameLights out{};
+    LightView& view = out.view;
     view.error_px = options.error_px;
     const std::array<float, 3> background = look.background.value_or(std::array<float, 3>{});
     std::copy(background.begin(), background.end(), view.background);

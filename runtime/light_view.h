@@ -27,14 +27,16 @@ struct FrameLights {
 /// Whether a picture is lit by more than the light at the eye: then tracers need FrameLights.
 bool has_lights(const SceneLook& look);
 
-/// Whether rays that do not begin at the eye are needed: then tracers need world_to_part.
-bool has_free_rays(const SceneLook& look);
+/// Whether light at a hit hangs on rays from there.
+bool has_light_rays(const SceneLook& look);
 
 /// Fails: Usage (numbers that mean nothing, too many lights or samples).
 Status check_lights(const SceneLook& look);
 
 /// Domain: check_lights is ok.
-FrameLights frame_lights(const PackImage& image, const RenderOptions& options, const ViewRays& rays);
+FrameLights frame_lights(const PackImage& image, const RenderOptions& options);
+
+PlaceView place_view(const PackImage& image, const ViewRays& rays);
 
 /// By instance.
 std::vector<WorldToPart> world_to_part(const PackImage& image);

@@ -65,7 +65,8 @@ struct SurfaceMapLook {
 };
 
 enum class CapStyle { None, Filled, Hatched };
-/// What lies on the side that `normal` points to is cut away. With several planes only what none cuts away stays.
+/// What lies on the side that `normal` points to is cut away. With several planes (6 at most) only what none cuts away
+/// stays.
 struct SectionPlane {
     std::array<double, 3> point_mm{};
     std::array<double, 3> normal{0, 0, 1}; // any length but 0
@@ -75,7 +76,6 @@ struct SectionLook {
     CapStyle caps = CapStyle::Filled;
     std::optional<std::array<float, 3>> cap_color; // none: each part's own
 };
-constexpr size_t kMostSectionPlanes = 6;
 
 /// Light from all around and above, hidden by what is near.
 struct Occlusion {

@@ -269,7 +269,7 @@ Result<FrameSetup> frame_setup(const CpuScene& scene, const RenderOptions& optio
         instance.first_node = part.node_count > 0 ? part.first_node : static_cast<uint32_t>(image.part_nodes.size());
         instance.first_leaf = part.first_leaf;
         instance.color_rgba = record.color_rgba;
-        instance.outside = outside[i];
+        instance.outside = outside[i] != 0 && options.look.section.planes.empty(); // a section shows the inside
     }
     return setup;
 }

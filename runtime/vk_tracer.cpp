@@ -3,6 +3,7 @@
 #include "runtime/border_cells.h"
 #include "runtime/frame_effects.h"
 #include "runtime/light_view.h"
+#include "runtime/section_view.h"
 #include "runtime/stochastic_frames.h"
 #include "runtime/tracer.h"
 #include "runtime/trim_mode.h"
@@ -36,6 +37,9 @@ const uint32_t kPrimarySpirv[] =
 const uint32_t kLightSpirv[] =
 #include "light.comp.inc"
     ;
+const uint32_t kCapsSpirv[] =
+#include "caps.comp.inc"
+    ;
 
 // Bounds the memory of a band and the time of a dispatch, which some drivers end after a second or two
 constexpr size_t kBandBytes = size_t{32} << 20;
@@ -57,6 +61,11 @@ constexpr uint32_t kSamplesADispatch = 16, kSoftwareSamplesADispatch = 1;
 bool is_lit(const RenderOptions& options)
 {
     return options.shade && has_lights(options.look);
+}
+
+bool is_cut(const RenderOptions& options)
+{
+    return !options.look.section.planes.empty();
 }
 
 bool reuses_hits(const RenderOptions& options)
@@ -96,7 +105,8 @@ private:
     Status prepare_edges(const RenderOptions& options, uint32_t rows_per_band);
     Status prepare_hits(std::initializer_list<uint32_t> bindings, size_t pixels, size_t pixel_bytes,
                         const char* option);
-    Status prepare_lights(const RenderOptions& options, const FrameSetup& setup, uint32_t rows_per_band);
+    Status upload(uint32_t binding, std::span<const std::byte> bytes, const char* name);
+    Status prepare_look(const RenderOptions& options, const FrameSetup& setup, uint32_t rows_per_band);
     Status prepare_kept(const RenderOptions& options);
     Result<bool> prepare_last_hits(const RenderOptions& options);
     Status fill(uint32_t binding, uint32_t word);
@@ -110,8 +120,9 @@ private:
     Result<double> retrace_stopped(const ComputePipeline& pipeline, FrameView view);
     Status set_retries(std::span<const uint32_t> pixels);
     Result<uint32_t> read_stopped_count();
-    Result<double> gather_samples(FrameView view);
+    Result<double> cast_free_rays(const ComputePipeline& pipeline, FrameView view);
     Result<double> gather_light(FrameView view);
+    Result<double> find_caps(FrameView view);
     Result<double> trace_band(const ComputePipeline& pipeline, const FrameView& view, bool read_back);
     Result<double> trace_frame(const ComputePipeline& pipeline, FrameView view, uint32_t rows_per_band, Frame* frame);
     void take_pixels(const FrameView& view, Frame& frame) const;
@@ -132,9 +143,11 @@ private:
     std::array<uint32_t, 2> next_hits_size_{}; // of the picture whose hits kBindNextHits holds; 0 x 0: of none
     VulkanBuffer retries_upload_;              // of kMostRetries indices
     VulkanBuffer counts_readback_;
-    FrameLights lights_;                        // of the picture at hand
-    ComputePipeline* light_pipeline_ = nullptr; // that gathers them; null: none needs rays
-    VulkanBuffer nothing_;                      // stands for what the picture does not need
+    FrameLights lights_; // of the picture at hand
+    // light.comp and caps.comp as the picture at hand needs them; null: it does not
+    ComputePipeline* light_pipeline_ = nullptr;
+    ComputePipeline* caps_pipeline_ = nullptr;
+    VulkanBuffer nothing_; // stands for what the picture does not need
     QueryPool timestamps_;
     struct MadePipeline {
         const uint32_t* spirv;
@@ -189,6 +202,15 @@ Status VulkanTracer::upload()
     return device_->validation_status();
 }
 
+Status VulkanTracer::upload(uint32_t binding, std::span<const std::byte> bytes, const char* name)
+{
+    Result<VulkanBuffer> buffer = upload_storage(*device_, bytes, name);
+    if (!buffer)
+        return buffer.error();
+    buffers_[binding] = std::move(*buffer);
+    return Done{};
+}
+
 // Builds and uploads what a trim mode reads beside the pack, when it is first asked for.
 Status VulkanTracer::upload_trims(TrimMode trim)
 {
@@ -216,7 +238,7 @@ Result<ComputePipeline*> VulkanTracer::pipeline(std::span<const uint32_t> spirv,
     constants[kSpecFeatures] = facts_.features | (options.shade ? kFeatureShade : 0) | (count ? kFeatureCount : 0) |
                                (edges_wanted_ ? kFeatureEdges : 0) | (stochastic ? kFeatureStochastic : 0) |
                                (keeps_hits(options) ? kFeatureKept : 0) | (reuses_hits(options) ? kFeatureReuse : 0) |
-                               (is_lit(options) ? kFeatureLights : 0);
+                               (is_lit(options) ? kFeatureLights : 0) | (is_cut(options) ? kFeatureCut : 0);
     constants[kSpecStackSize] = facts_.stack_size;
     if (device_->is_software()) {
         constants[kSpecLocalFloats] = facts_.largest_net_floats <= kMostLocalFloats ? facts_.largest_net_floats : 0;
@@ -290,40 +312,53 @@ Status VulkanTracer::prepare_edges(const RenderOptions& options, uint32_t rows_p
     return Done{};
 }
 
-// Uploads what a picture's lights are, and where they are gathered. Nothing is made for the light at the eye alone.
-Status VulkanTracer::prepare_lights(const RenderOptions& options, const FrameSetup& setup, uint32_t rows_per_band)
+// Uploads what a picture's lights and section planes are, and makes room for what is kept of a pixel between
+// dispatches. Nothing is made for what the picture has not.
+Status VulkanTracer::prepare_look(const RenderOptions& options, const FrameSetup& setup, uint32_t rows_per_band)
 {
     lights_ = {};
-    if (!is_lit(options))
+    const bool lit = is_lit(options), cut = is_cut(options);
+    if (!lit && !cut)
         return Done{};
     const PackImage& image = scene_->pack.image;
-    lights_ = frame_lights(image, options, {setup.eye, setup.w0, setup.step_x, setup.step_y, setup.view.tau_ref});
+    const ViewRays rays{setup.eye, setup.w0, setup.step_x, setup.step_y, setup.view.tau_ref};
+    if (lit)
+        lights_ = frame_lights(image, options);
+    const PlaceView places = place_view(image, rays);
     std::vector<LightRecord> records = lights_.lights;
     records.resize(kMostLights);
     std::vector<std::byte> bytes;
-    const auto append = [&bytes](std::span<const std::byte> more) {
+    const auto append = [&bytes](auto span) {
+        const std::span<const std::byte> more = std::as_bytes(span);
         bytes.insert(bytes.end(), more.begin(), more.end());
     };
-    append(std::as_bytes(std::span(&lights_.view, 1)));
-    append(std::as_bytes(std::span(records)));
-    append(std::as_bytes(std::span(lights_.samples)));
-    Result<VulkanBuffer> uploaded = upload_storage(*device_, bytes, "the lights");
-    if (!uploaded)
-        return uploaded.error();
-    buffers_[kBindLights] = std::move(*uploaded);
+    append(std::span(&places, 1));
+    append(std::span(&lights_.view, 1));
+    append(std::span(records));
+    append(std::span(lights_.samples));
+    if (const Status uploaded = upload(kBindPlaces, bytes, "the lights"); !uploaded)
+        return uploaded;
     const size_t band_pixels = size_t{rows_per_band} * options.width;
-    if (const Status ready = prepare_hits({kBindLitPixels}, band_pixels, sizeof(LitPixel), "the lights"); !ready)
-        return ready;
-    if (!has_free_rays(options.look))
+    if (lit)
+        if (const Status ready = prepare_hits({kBindLitPixels}, band_pixels, sizeof(LitPixel), "the lights"); !ready)
+            return ready;
+    if (cut) {
+        const SectionView section = section_view(image, options.look.section, rays);
+        if (const Status uploaded = upload(kBindSection, std::as_bytes(std::span(&section, 1)), "the section");
+            !uploaded)
+            return uploaded;
+    }
+    if (has_caps(options.look.section))
+        if (const Status ready = prepare_hits({kBindCaps}, band_pixels, sizeof(CapState), "the section"); !ready)
+            return ready;
+    if (!(lit && has_light_rays(options.look)) && !has_caps(options.look.section))
         return Done{};
     if (buffers_[kBindToPart].size_bytes() == 0) {
         const std::vector<WorldToPart> to_part = world_to_part(image);
-        Result<VulkanBuffer> parts = upload_storage(*device_, std::as_bytes(std::span(to_part)), "the placements");
-        if (!parts)
-            return parts.error();
-        buffers_[kBindToPart] = std::move(*parts);
+        if (const Status uploaded = upload(kBindToPart, std::as_bytes(std::span(to_part)), "the placements"); !uploaded)
+            return uploaded;
     }
-    return device_->is_software() ? prepare_hits({kBindStopped}, band_pixels + 1, sizeof(uint32_t), "the lights")
+    return device_->is_software() ? prepare_hits({kBindStopped}, band_pixels + 1, sizeof(uint32_t), "free rays")
                                   : Status(Done{});
 }
 
@@ -504,7 +539,7 @@ Result<double> VulkanTracer::retrace_stopped(const ComputePipeline& pipeline, Fr
     return ms;
 }
 
-// How many pixels light.comp's last dispatch must gather for again.
+// How many pixels' free rays the last dispatch could not follow to their ends.
 Result<uint32_t> VulkanTracer::read_stopped_count()
 {
     const Status copied = device_->run([&](VkCommandBuffer commands) {
@@ -520,19 +555,19 @@ Result<uint32_t> VulkanTracer::read_stopped_count()
     return count;
 }
 
-// One dispatch of light.comp over the band, and again for the pixels that the driver's loop limit stopped, each alone.
-// Returns milliseconds. Fails: DeviceFailed, if one needs more even so.
-Result<double> VulkanTracer::gather_samples(FrameView view)
+// One dispatch of light.comp or caps.comp over the band, and again for the pixels that the driver's loop limit stopped,
+// each alone. Returns milliseconds. Fails: DeviceFailed, if one needs more even so.
+Result<double> VulkanTracer::cast_free_rays(const ComputePipeline& pipeline, FrameView view)
 {
     const bool limited = device_->is_software();
-    const auto gather = [&](uint32_t groups_x, uint32_t groups_y) -> Result<double> {
+    const auto cast = [&](uint32_t groups_x, uint32_t groups_y) -> Result<double> {
         if (limited)
             if (const Status none = fill(kBindStopped, 0); !none)
                 return none.error();
-        return time_dispatch(*light_pipeline_, view, groups_x, groups_y);
+        return time_dispatch(pipeline, view, groups_x, groups_y);
     };
     Result<double> ms =
-        gather((view.width + kGroupSide - 1) / kGroupSide, (view.row_count + kGroupSide - 1) / kGroupSide);
+        cast((view.width + kGroupSide - 1) / kGroupSide, (view.row_count + kGroupSide - 1) / kGroupSide);
     if (!ms || !limited)
         return ms;
     const Result<uint32_t> count = read_stopped_count();
@@ -559,7 +594,7 @@ Result<double> VulkanTracer::gather_samples(FrameView view)
         const auto here = std::span(pixels).subspan(first, std::min<size_t>(kMostRetries, pixels.size() - first));
         if (const Status ready = set_retries(here); !ready)
             return ready.error();
-        const Result<double> alone_ms = gather(static_cast<uint32_t>(here.size()), 1);
+        const Result<double> alone_ms = cast(static_cast<uint32_t>(here.size()), 1);
         if (!alone_ms)
             return alone_ms;
         const Result<uint32_t> left = read_stopped_count();
@@ -567,7 +602,7 @@ Result<double> VulkanTracer::gather_samples(FrameView view)
             return left.error();
         if (*left > 0)
             return Error{ErrorCode::DeviceFailed, device_->name(),
-                         fmt::format("the rays to lights of {} pixels need more loop iterations than this software "
+                         fmt::format("rays from the hits of {} pixels need more loop iterations than this software "
                                      "driver runs; use --device cpu",
                                      *left)};
         *ms += *alone_ms;
@@ -584,7 +619,7 @@ Result<double> VulkanTracer::gather_light(FrameView view)
         view.gathered = light;
         for (view.first_sample = 0; view.first_sample < sample_count; view.first_sample += at_once) {
             view.end_sample = std::min(view.first_sample + at_once, sample_count);
-            const Result<double> some_ms = gather_samples(view);
+            const Result<double> some_ms = cast_free_rays(*light_pipeline_, view);
             if (!some_ms)
                 return some_ms.error();
             ms += *some_ms;
@@ -603,6 +638,19 @@ Result<double> VulkanTracer::gather_light(FrameView view)
     return ms;
 }
 
+// Closes what section planes cut open in the band's pixels. Returns milliseconds.
+Result<double> VulkanTracer::find_caps(FrameView view)
+{
+    double ms = 0;
+    for (view.gathered = 0; view.gathered < kInsideQuestions; ++view.gathered) {
+        const Result<double> some_ms = cast_free_rays(*caps_pipeline_, view);
+        if (!some_ms)
+            return some_ms;
+        ms += *some_ms;
+    }
+    return ms;
+}
+
 Result<double> VulkanTracer::trace_band(const ComputePipeline& pipeline, const FrameView& view, bool read_back)
 {
     Result<double> ms = time_dispatch(pipeline, view, (view.width + kGroupSide - 1) / kGroupSide,
@@ -615,13 +663,19 @@ Result<double> VulkanTracer::trace_band(const ComputePipeline& pipeline, const F
             return retry_ms;
         *ms += *retry_ms;
     }
+    if (ms.ok() && caps_pipeline_) {
+        const Result<double> caps_ms = find_caps(view);
+        if (!caps_ms)
+            return caps_ms;
+        *ms += *caps_ms;
+    }
     if (ms.ok() && light_pipeline_) {
         const Result<double> light_ms = gather_light(view);
         if (!light_ms)
             return light_ms;
         *ms += *light_ms;
     }
-    if (!ms || !read_back || (device_->is_software() && !light_pipeline_))
+    if (!ms || !read_back || (device_->is_software() && !light_pipeline_ && !caps_pipeline_))
         return ms;
     const Status read = read_band(view);
     return read.ok() ? ms : Result<double>(read.error());
@@ -666,12 +720,16 @@ void VulkanTracer::take_pixels(const FrameView& view, Frame& frame) const
             continue;
         frame.depth_mm[at] = pixel.depth_mm;
         std::copy_n(pixel.normal, 3, &frame.normal[3 * at]);
+        frame.face[at] = static_cast<int32_t>(pixel.face);
+        frame.instance[at] = static_cast<int32_t>(pixel.instance);
+        if (frame.face[at] < 0) { // a cap
+            std::copy_n(pixel.uv_face, 2, &frame.uv[2 * at]);
+            continue;
+        }
         const FaceRecord& face = image.faces[pixel.face];
         for (int k = 0; k < 2; ++k)
             frame.uv[2 * at + k] = static_cast<float>(face.domain_lo[k] + static_cast<double>(pixel.uv_face[k]) *
                                                                               (face.domain_hi[k] - face.domain_lo[k]));
-        frame.face[at] = static_cast<int32_t>(pixel.face);
-        frame.instance[at] = static_cast<int32_t>(pixel.instance);
     }
 }
 
@@ -720,6 +778,8 @@ Result<Frame> VulkanTracer::render(const RenderOptions& options, RenderStats& st
         return drawable.error();
     if (const Status lights = check_lights(options.look); !lights)
         return lights.error();
+    if (const Status section = check_section(options.look.section); !section)
+        return section.error();
     const VkPhysicalDeviceLimits& limits = device_->properties().limits;
     const size_t row_bytes = size_t{options.width} * sizeof(FramePixel);
     const size_t band_bytes = std::min<size_t>(kBandBytes, limits.maxStorageBufferRange);
@@ -739,7 +799,7 @@ Result<Frame> VulkanTracer::render(const RenderOptions& options, RenderStats& st
         return ready.error();
     if (const Status ready = prepare_edges(options, rows_per_band); !ready)
         return ready.error();
-    if (const Status ready = prepare_lights(options, *setup, rows_per_band); !ready)
+    if (const Status ready = prepare_look(options, *setup, rows_per_band); !ready)
         return ready.error();
     if (const Status ready = prepare_kept(options); !ready)
         return ready.error();
@@ -761,17 +821,37 @@ Result<Frame> VulkanTracer::render(const RenderOptions& options, RenderStats& st
         bound[i] = buffers_[i].size_bytes() > 0 ? &buffers_[i] : &nothing_;
     (*counting)->set_buffers(bound);
     (*timed)->set_buffers(bound);
-    std::array<ComputePipeline*, 2> light_pipelines{}; // that count, and that are timed
-    if (is_lit(options) && has_free_rays(options.look))
+    // of each, one that counts and one that is timed
+    const auto free_pipelines = [&](std::span<const uint32_t> spirv) -> Result<std::array<ComputePipeline*, 2>> {
+        std::array<ComputePipeline*, 2> made{};
         for (size_t i = 0; i < 2; ++i) {
-            const Result<ComputePipeline*> light = pipeline(kLightSpirv, *trim, options, i == 0 || !count_apart);
-            if (!light)
-                return light.error();
-            (*light)->set_buffers(bound);
-            if (const Result<double> warm = time_dispatch(**light, setup->view, 1, 1); !warm)
+            const Result<ComputePipeline*> one = pipeline(spirv, *trim, options, i == 0 || !count_apart);
+            if (!one)
+                return one.error();
+            (*one)->set_buffers(bound);
+            if (const Result<double> warm = time_dispatch(**one, setup->view, 1, 1); !warm)
                 return warm.error();
-            light_pipelines[i] = *light;
+            made[i] = *one;
         }
+        return made;
+    };
+    std::array<ComputePipeline*, 2> light_pipelines{}, caps_pipelines{};
+    if (is_lit(options) && has_light_rays(options.look)) {
+        const auto made = free_pipelines(kLightSpirv);
+        if (!made)
+            return made.error();
+        light_pipelines = *made;
+    }
+    if (has_caps(options.look.section)) {
+        const auto made = free_pipelines(kCapsSpirv);
+        if (!made)
+            return made.error();
+        caps_pipelines = *made;
+    }
+    const auto choose_free_pipelines = [&](size_t which) {
+        light_pipeline_ = light_pipelines[which];
+        caps_pipeline_ = caps_pipelines[which];
+    };
     // an empty band: drivers that compile at the first dispatch do it here
     if (const Result<double> warm = time_dispatch(**timed, setup->view, 1, 1); !warm)
         return warm.error();
@@ -786,14 +866,14 @@ Result<Frame> VulkanTracer::render(const RenderOptions& options, RenderStats& st
     choose_start(0);
     if (const Status none = forget_kept(); !none)
         return none.error();
-    light_pipeline_ = light_pipelines[0];
+    choose_free_pipelines(0);
     if (count_apart) {
         if (const Result<double> ms = trace_frame(**counting, view, rows_per_band, nullptr); !ms)
             return ms.error();
         if (const Status none = forget_kept(); !none)
             return none.error();
     }
-    light_pipeline_ = light_pipelines[1];
+    choose_free_pipelines(1);
     Frame frame;
     const size_t pixels = size_t{options.width} * options.height;
     frame.width = options.width;

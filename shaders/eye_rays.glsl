@@ -8,10 +8,12 @@ struct Ray {
     vec3 across; // w - w0, world
 };
 
-// `past` of the eye
+float cut_begin = 0.0f; // where section planes let the ray begin, with kFeatureCut
+
+// `past` of the ray's begin: the eye, or a section plane
 float ray_begin()
 {
-    return -view.tau_ref;
+    return has_feature(kFeatureCut) ? cut_begin : -view.tau_ref;
 }
 
 // The ray's tau of a hit

@@ -34,7 +34,8 @@ struct FrameView {
     uint line_classes; // bit kEdge...
     float start[2];    // with kFeatureStochastic: start_of_frame (runtime/stochastic_frames.h)
     uint alone;        // 1: each workgroup traces pixel retries[workgroup] of the band, with one of its invocations
-    // of light.comp: what is gathered, a light's number or kGatherSky, and samples [first_sample, end_sample) of it
+    // of light.comp: what is gathered, a light's number or kGatherSky, and samples [first_sample, end_sample) of it; of
+    // caps.comp: the question's number
     uint gathered;
     uint first_sample;
     uint end_sample;
@@ -103,7 +104,7 @@ TRIMRAY_CONST uint kCountFreeRays = 6u;
 TRIMRAY_CONST uint kCountFreeLeaves = 7u;
 TRIMRAY_CONST uint kFrameCounts = 8u;
 
-// Specialisation constants of primary.comp and light.comp, by constant_id
+// Specialisation constants of the shaders, by constant_id
 TRIMRAY_CONST uint kSpecTrimMode = 0u; // kTrimBy
 TRIMRAY_CONST uint kSpecKinds = 1u;    // bit kKind...: the pack holds such patches
 TRIMRAY_CONST uint kSpecFeatures = 2u; // kFeature bits
@@ -128,12 +129,13 @@ TRIMRAY_CONST uint kFeatureKept = 128u;      // ... in more frames than one
 TRIMRAY_CONST uint kFeatureReuse = 256u;     // RenderOptions::reuse_last
 
 TRIMRAY_CONST uint kFeatureLights = 512u; // SceneLook's lights: the pixels' LitPixels are kept
+TRIMRAY_CONST uint kFeatureCut = 1024u;   // SceneLook's section planes
 
 TRIMRAY_CONST uint kGatherSky = 0xffffffffu; // FrameView::gathered
 
 TRIMRAY_CONST uint kGroupSide = 8u; // workgroups are 8 x 8 pixels
 
-// Bindings of primary.comp and light.comp
+// Bindings of the shaders
 TRIMRAY_CONST uint kBindInstances = 0u;
 TRIMRAY_CONST uint kBindTopNodes = 1u;
 TRIMRAY_CONST uint kBindPartNodes = 2u;
@@ -159,12 +161,14 @@ TRIMRAY_CONST uint kBindKept = 20u; // a KeptHit a pixel of the picture; of one 
 // a LastHit a pixel of the picture; of one element without kFeatureReuse
 TRIMRAY_CONST uint kBindLastHits = 21u; // the last picture's
 TRIMRAY_CONST uint kBindNextHits = 22u; // this one's, for the next
-// of one element without kFeatureLights
-TRIMRAY_CONST uint kBindLights = 23u;    // LightView, kMostLights LightRecords, samples (shaders/light_layout.h)
+// of nothing where no light, section or free ray asks for them
+TRIMRAY_CONST uint kBindPlaces = 23u;    // PlaceView, LightView, kMostLights LightRecords, samples (light_layout.h)
 TRIMRAY_CONST uint kBindToPart = 24u;    // a WorldToPart an instance
 TRIMRAY_CONST uint kBindLitPixels = 25u; // a LitPixel a pixel of the band
-TRIMRAY_CONST uint kBindStopped = 26u; // pixels of the band that light.comp must gather for again: how many, and which
-TRIMRAY_CONST uint kFrameBindings = 27u;
+TRIMRAY_CONST uint kBindStopped = 26u;   // pixels of the band to cast free rays from again: how many, and which
+TRIMRAY_CONST uint kBindSection = 27u;   // SectionView (section_layout.h)
+TRIMRAY_CONST uint kBindCaps = 28u;      // a CapState a pixel of the band
+TRIMRAY_CONST uint kFrameBindings = 29u;
 
 #ifdef __cplusplus
 static_assert(sizeof(FrameView) == 128); // what every device takes

@@ -197,6 +197,9 @@ void offer(PatchRay ray, uint face_id, FaceRecord face, uint leaf, uint instance
         hit.doubt = min(hit.doubt, past - near);
     if (!inside)
         return;
+#ifdef TRIMRAY_COLLECTS
+    collect_crossing(past, as_near(ray, hit), back, face.tolerance_mm, leaf, instance);
+#else
     hit.past = past;
     hit.back = back;
     hit.own = own;
@@ -206,6 +209,7 @@ void offer(PatchRay ray, uint face_id, FaceRecord face, uint leaf, uint instance
     hit.uv_patch = uv_patch;
     hit.leaf = leaf;
     hit.instance = instance;
+#endif
 }
 
 // uv_patch of a point of a native surface
@@ -577,7 +581,11 @@ void leaf_hit(uint leaf, uint instance_index, FrameInstance instance, Ray whole_
         return;
     uint kind = patch.shape & 0xffu;
     FaceRecord face = faces[patch.face];
+#ifdef TRIMRAY_COLLECTS
+    bool rims = true; // on which side it is met must be known of every hit
+#else
     bool rims = has_feature(kFeatureRims) && instance.outside != 0u && (face.flags & kFaceRims) != 0u;
+#endif
     if (kind == kKindBezier) {
         if (has_kind(kKindBezier))
             bezier_hit(ray, patch, face, box, ray.past + in_box.near, leaf, instance_index, rims, hit);

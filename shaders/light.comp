@@ -9,6 +9,7 @@
 #include "format/kd_layout.h"
 #include "shaders/frame_layout.h"
 #include "shaders/light_layout.h"
+#include "shaders/section_layout.h"
 // first: the formulas fetch through it, and they make `scalar`, a layout there, a type
 #include "shaders/scene_buffers.glsl"
 
@@ -22,6 +23,7 @@
 #include "shaders/shared/precision.h"
 #include "shaders/shared/quadric.h"
 #include "shaders/shared/rim.h"
+#include "shaders/shared/section.h"
 #include "shaders/shared/torus.h"
 #include "shaders/shared/trim_kd.h"
 #include "shaders/shared/trim_lookup.h"
@@ -30,7 +32,9 @@
 #include "shaders/free_rays.glsl"
 #include "shaders/leaf_hit.glsl"
 #include "shaders/walk.glsl"
+#include "shaders/places.glsl"
 #include "shaders/light.glsl"
+#include "shaders/section.glsl"
 #include "shaders/work_counts.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
@@ -46,6 +50,8 @@ vec2 sample_at(uint index, uvec2 picture_at)
 // Whether the ray meets anything before `reach`; `complete`: false where the driver's loop limit would have cut it short
 bool is_stopped(Ray ray, float reach, inout bool complete)
 {
+    if (has_feature(kFeatureCut))
+        reach = cut_free_ray(ray.origin, ray.direction, reach);
     Hit hit = Hit(reach, 0.0f, vec2(0.0f), vec2(0.0f), kNoLeaf, 0xffffffffu, kHuge, false, true, 0.0f);
     ++free_ray_count;
     complete = walk(ray, Guess(kNoLeaf, 0u), hit) && complete;

@@ -19,13 +19,10 @@ bool needs_rays(LightRecord light)
 
 LitPixel lit_pixel(vec2 pixel, float past, vec3 normal, vec3 to_eye, vec3 color, float specular)
 {
-    vec3 along = vector(light_view.along) + pixel.x * vector(light_view.along_x) + pixel.y * vector(light_view.along_y);
-    vec3 place = vector(light_view.place) + pixel.x * vector(light_view.place_x) +
-                 pixel.y * vector(light_view.place_y) + past * along;
+    vec3 place = place_at(pixel, past);
     vec3 side = dot(normal, to_eye) < 0.0f ? -normal : normal;
-    float width = abs(past + light_view.tau_ref) * light_view.pixel;
     return LitPixel(float[3](place.x, place.y, place.z), float[3](side.x, side.y, side.z),
-                    float[3](to_eye.x, to_eye.y, to_eye.z), float[3](color.x, color.y, color.z), specular, width);
+                    float[3](to_eye.x, to_eye.y, to_eye.z), float[3](color.x, color.y, color.z), specular, place_width(past));
 }
 
 // Where the rays begin that leave it

@@ -1,6 +1,6 @@
-// What lights, occlusion and mirrors need of a frame, made by the host for both tracers (runtime/light_view.h). Scalar
-// block layout, 4-byte fields. Rays that do not begin at the eye live in the top tree's units (the world's origin and
-// scale as the pack has them), so nothing depends on the model's unit; in all of them s counts such units.
+// What lights, occlusion, mirrors and caps need of a frame, made by the host for both tracers (runtime/light_view.h).
+// Scalar block layout, 4-byte fields. Rays that do not begin at the eye live in the top tree's units (the world's
+// origin and scale as the pack has them), so nothing depends on the model's unit; in all of them s counts such units.
 #ifndef TRIMRAY_LIGHT_LAYOUT_H
 #define TRIMRAY_LIGHT_LAYOUT_H
 
@@ -12,7 +12,8 @@ namespace trimray {
 
 TRIMRAY_CONST uint kTurns = 16u; // samples are turned by pixel, alike in every 4 x 4
 
-struct LightView {
+// Where hits of the eye's rays are.
+struct PlaceView {
     // a hit at `past` (mm of tau - tau_ref) on the ray of pixel (x, y) from the picture's middle lies at
     // place + x place_x + y place_y + past (along + x along_x + y along_y)
     float place[3];
@@ -23,6 +24,10 @@ struct LightView {
     float along_y[3];
     float tau_ref; // mm
     float pixel;   // a pixel's width where tau is 1 mm
+    float per_mm;  // the top tree's units
+};
+
+struct LightView {
     float error_px;
     uint light_count;
     uint light_samples;
@@ -72,7 +77,8 @@ struct LitPixel {
 
 #ifdef __cplusplus
 static_assert(sizeof(LitPixel) == 56);
-static_assert(sizeof(LightView) == 4 * 62);
+static_assert(sizeof(PlaceView) == 84);
+static_assert(sizeof(LightView) == 4 * 42);
 static_assert(sizeof(LightRecord) == 32);
 static_assert(sizeof(WorldToPart) == 52);
 } // namespace trimray

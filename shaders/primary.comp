@@ -9,6 +9,7 @@
 #include "format/kd_layout.h"
 #include "shaders/frame_layout.h"
 #include "shaders/light_layout.h"
+#include "shaders/section_layout.h"
 // first: the formulas fetch through it, and they make `scalar`, a layout there, a type
 #include "shaders/scene_buffers.glsl"
 
@@ -23,6 +24,7 @@
 #include "shaders/shared/precision.h"
 #include "shaders/shared/quadric.h"
 #include "shaders/shared/rim.h"
+#include "shaders/shared/section.h"
 #include "shaders/shared/shading.h"
 #include "shaders/shared/torus.h"
 #include "shaders/shared/trim_kd.h"
@@ -35,7 +37,10 @@
 #include "shaders/last_hits.glsl"
 
 #include "shaders/border_edges.glsl"
+#include "shaders/colors.glsl"
+#include "shaders/places.glsl"
 #include "shaders/light.glsl"
+#include "shaders/section.glsl"
 #include "shaders/work_counts.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
@@ -78,12 +83,6 @@ vec3 world_normal(Hit hit, FrameInstance instance, PatchRecord patch, FaceRecord
     return combine(vector(instance.normal_x), vector(instance.normal_y), vector(instance.normal_z), n);
 }
 
-vec3 linear_color(uint rgba)
-{
-    return vec3(linear_of_srgb(float(rgba & 0xffu) / 255.0f), linear_of_srgb(float((rgba >> 8) & 0xffu) / 255.0f),
-                linear_of_srgb(float((rgba >> 16) & 0xffu) / 255.0f));
-}
-
 FramePixel miss_pixel(bool doubt)
 {
     FramePixel pixel;
@@ -118,16 +117,13 @@ FramePixel hit_pixel(Hit hit, Ray eye_ray, uint band_pixel)
     result.status = kPixelHit | (hit.doubt <= hit.past ? 0u : kPixelCertified);
     result.rgba = float[4](0.0f, 0.0f, 0.0f, 1.0f);
     if (has_feature(kFeatureShade)) {
-        uint rgba = instance.color_rgba >> 24 != 0u ? instance.color_rgba : kDefaultColor;
-        if ((face.flags & kFaceHasColor) != 0u)
-            rgba = face.color_rgba;
-        vec3 color;
+        vec3 color = face_color(face, instance);
         if (has_feature(kFeatureLights)) {
-            LitPixel point = lit_pixel(eye_ray.pixel, hit.past, normal, to_eye, linear_color(rgba), kSpecular);
+            LitPixel point = lit_pixel(eye_ray.pixel, hit.past, normal, to_eye, color, kSpecular);
             lit_pixels[band_pixel] = point;
             color = light_without_rays(point);
         } else
-            color = shade(linear_color(rgba), normal, to_eye);
+            color = shade(color, normal, to_eye);
         result.rgba = float[4](color.x, color.y, color.z, 1.0f);
     }
     return result;
@@ -151,6 +147,11 @@ void main()
             before = load_kept(picture_pixel);
         if (has_feature(kFeatureStochastic))
             before.doubt = -kHuge; // plain Newton claims nothing
+        if (has_feature(kFeatureCut)) {
+            CutSpan span = cut_span(pixel);
+            cut_begin = span.begin;
+            before.past = span.begin < span.end ? min(before.past, span.end) : -kHuge;
+        }
         Guess guess = Guess(kNoLeaf, 0u);
         // where the loop limit bears on what is searched, alone, the picture must not hang on the last one
         if (has_feature(kFeatureReuse) && view.alone == 0u)
@@ -164,6 +165,8 @@ void main()
                 break;
             rims_cut = true;
         }
+        if (has_feature(kFeatureCut) && hit.leaf == kNoLeaf)
+            hit.past = kHuge;
         if (has_feature(kFeatureKept)) {
             // a pixel changes only where its new hit is nearer than what was kept
             if (complete && hit.past < before.past)

@@ -22,8 +22,9 @@ layout(scalar, set = 0, binding = kBindKdFaces) readonly buffer KdFaces { KdFace
 layout(scalar, set = 0, binding = kBindKept) buffer KeptHits { KeptHit kept_hits[]; };
 layout(scalar, set = 0, binding = kBindLastHits) readonly buffer LastHits { LastHit last_hits[]; };
 layout(scalar, set = 0, binding = kBindNextHits) writeonly buffer NextHits { LastHit next_hits[]; };
-layout(scalar, set = 0, binding = kBindLights) readonly buffer Lights
+layout(scalar, set = 0, binding = kBindPlaces) readonly buffer Places
 {
+    PlaceView places;
     LightView light_view;
     LightRecord light_records[kMostLights];
     vec2 light_samples[];
@@ -35,6 +36,8 @@ layout(scalar, set = 0, binding = kBindStopped) buffer Stopped
     uint stopped_count;
     uint stopped[];
 };
+layout(scalar, set = 0, binding = kBindSection) readonly buffer Section { SectionView section; };
+layout(scalar, set = 0, binding = kBindCaps) buffer Caps { CapState caps[]; };
 layout(scalar, push_constant) uniform View { FrameView view; };
 
 // Specialised to what the pack holds and the frame asks for: what is false here costs no instruction.
