@@ -18,55 +18,11 @@
 
 SHARED_OPEN
 
-/// The surfaces that a packet's rays cross, unordered.
-struct Crossings {
-    float at[kLanes][kMostCrossings];
-    uint what[kLanes][kMostCrossings]; // instance << 1 | kCrossingLeaves
-    uint leaf[kLanes][kMostCrossings];
-    uint count[kLanes];
-    bool too_many[kLanes];
-};
-
-/// Free rays whose hits are all kept.
-struct CrossingRays : FreeRays {
-    static constexpr bool kCollects = true;
-    Crossings* crossings;
-    float per_mm; // the top tree's units
-
-    /// Two hits of one instance that both enter or both leave within the face's tolerance are one: faces overlap there.
-    HWY_ATTR void collect(mask taken, real at, mask leaves, const LeafAt& leaf, float tolerance_mm) const
-    {
-        alignas(64) float s[kLanes], slack[kLanes];
-        store(at, s);
-        store(rounding * 4.0f + tolerance_mm * per_mm, slack);
-        const uint leaving = lane_bits(leaves);
-        for (uint left = lane_bits(taken); left != 0; left &= left - 1) {
-            const int lane = __builtin_ctz(left);
-            const uint what = leaf.instance << 1 | (leaving >> lane & 1u);
-            uint& count = crossings->count[lane];
-            bool known = false;
-            for (uint i = 0; i < count && !known; ++i)
-                known = crossings->what[lane][i] == what && std::abs(crossings->at[lane][i] - s[lane]) <= slack[lane];
-            if (known)
-                continue;
-            if (count == kMostCrossings) {
-                crossings->too_many[lane] = true;
-                continue;
-            }
-            crossings->at[lane][count] = s[lane];
-            crossings->what[lane][count] = what;
-            crossings->leaf[lane][count] = leaf.leaf;
-            ++count;
-        }
-    }
-};
-
 class CapFinder {
 public:
     CapFinder(const BlockJob& job, BlockScratch& scratch, const FetchSource& source, WorkCounts& work)
         : job_(job), section_(*job.section), places_(*job.places), walk_(job, scratch, source, work)
     {
-        walk_.rims_cut() = false;
     }
 
     /// What the planes leave of the pixels' rays.
@@ -132,9 +88,8 @@ private:
     {
         Crossings& crossings = crossings_;
         std::fill_n(crossings.count, kLanes, 0u);
-        std::fill_n(crossings.too_many, kLanes, false);
-        const float per_mm = job_.places->per_mm;
-        walk_.trace(rays, false, [&](const FreeRays& free) HWY_ATTR { return CrossingRays{free, &crossings, per_mm}; });
+        crossings.per_mm = job_.places->per_mm;
+        walk_.trace(rays, false, &crossings);
         uint inside = 0;
         for (uint left = asked; left != 0; left &= left - 1) {
             const int lane = __builtin_ctz(left);
@@ -211,7 +166,7 @@ private:
     const BlockJob& job_;
     const SectionView& section_;
     const PixelPlaces places_;
-    FreeWalk<CrossingRays> walk_;
+    FreeWalk walk_;
     Crossings crossings_;
 };
 

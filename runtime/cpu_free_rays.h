@@ -30,14 +30,48 @@ struct FreePacket {
     float footprint; // how well hits must be known: a pixel's width where the rays come from
 };
 
+/// The surfaces that a packet's rays cross, unordered.
+struct Crossings {
+    float per_mm; // the top tree's units
+    float at[kLanes][kMostCrossings];
+    uint what[kLanes][kMostCrossings]; // instance << 1 | kCrossingLeaves
+    uint leaf[kLanes][kMostCrossings];
+    uint count[kLanes];
+};
+
+/// Two hits of one instance that both enter or both leave within `apart` are one: faces overlap there.
+[[maybe_unused]] static HWY_ATTR HWY_NOINLINE void add_crossings(Crossings& crossings, mask taken, real at, real apart,
+                                                                 mask leaves, const LeafAt& leaf)
+{
+    alignas(64) float s[kLanes], slack[kLanes];
+    store(at, s);
+    store(apart, slack);
+    const uint leaving = lane_bits(leaves);
+    for (uint left = lane_bits(taken); left != 0; left &= left - 1) {
+        const int lane = __builtin_ctz(left);
+        const uint what = leaf.instance << 1 | (leaving >> lane & 1u);
+        uint& count = crossings.count[lane];
+        bool known = false;
+        for (uint i = 0; i < count && !known; ++i)
+            known = crossings.what[lane][i] == what && std::abs(crossings.at[lane][i] - s[lane]) <= slack[lane];
+        if (known || count == kMostCrossings)
+            continue;
+        crossings.at[lane][count] = s[lane];
+        crossings.what[lane][count] = what;
+        crossings.leaf[lane][count] = leaf.leaf;
+        ++count;
+    }
+}
+
 /// What a packet's rays are for a patch: `at` is s.
 struct FreeRays {
     static constexpr bool kCertifies = false;
-    static constexpr bool kCollects = false;
+    static constexpr bool kCollects = true;
     mask alive;
     real from; // s at t = 0
     real rounding;
-    float pixel; // patch units
+    float pixel;          // patch units
+    Crossings* crossings; // takes all hits; null: the nearest is looked for
 
     real base() const { return from; }
     float per_t() const { return 1; }
@@ -45,10 +79,16 @@ struct FreeRays {
     HWY_ATTR mask is_ahead(real at) const { return at > 0.0f; }
     float footprint() const { return pixel; }
     HWY_ATTR real footprint(real) const { return real(pixel); }
+
+    HWY_ATTR HWY_INLINE bool collect(mask taken, real at, mask leaves, const LeafAt& leaf, float tolerance_mm) const
+    {
+        if (!crossings)
+            return false;
+        add_crossings(*crossings, taken, at, rounding * 4.0f + tolerance_mm * crossings->per_mm, leaves, leaf);
+        return true;
+    }
 };
 
-/// Rays: FreeRays, or what is made from one.
-template <class Rays>
 class FreeWalk {
 public:
     FreeWalk(const BlockJob& job, BlockScratch& scratch, const FetchSource& source, WorkCounts& work)
@@ -59,11 +99,12 @@ public:
         kept.leaf.resize(FreeMiddles::kCount, ~0u);
     }
 
-    /// Meets the leaves that the rays pass before their hits; with `any` a ray ends at its first hit found. make_rays
-    /// turns what a packet is for a patch into Rays.
-    template <class MakeRays>
-    HWY_ATTR HWY_NOINLINE PacketHit trace(const FreePacket& rays, bool any, MakeRays make_rays)
+    /// The nearest hits; hit.best is s. With `any` a ray ends at the first hit that is found. With crossings all hits
+    /// go there, rims' backs too, and none is the nearest.
+    HWY_ATTR HWY_NOINLINE PacketHit trace(const FreePacket& rays, bool any, Crossings* crossings = nullptr)
     {
+        crossings_ = crossings;
+        leaf_hits_.rims_cut = crossings == nullptr;
         PacketHit hit;
         hit.best = select(rays.alive, rays.reach, real(-kHuge));
         hit.leaf = integer(~0u);
@@ -74,15 +115,13 @@ public:
         hit.doubt = real(kHuge);
         work_.free_rays += lane_count(rays.alive);
         recent_.clear();
-        const auto enter = [&](uint instance) HWY_ATTR { meet_instance(rays, any, instance, make_rays, hit); };
+        const auto enter = [&](uint instance) HWY_ATTR { meet_instance(rays, any, instance, hit); };
         if (image_.instances.size() == 1)
             enter(0);
         else if (!image_.top_nodes.empty())
             walk(image_.top_nodes.data(), tree_packet(rays.origin, rays.direction), hit, enter);
         return hit;
     }
-
-    bool& rims_cut() { return leaf_hits_.rims_cut; }
 
 private:
     static constexpr int kMostWaiting = 3 * int(kMaxBvhDepth) + 2; // a visit takes one and leaves up to four
@@ -96,8 +135,7 @@ private:
         return {origin, real3(safe_inverse(direction.x), safe_inverse(direction.y), safe_inverse(direction.z))};
     }
 
-    template <class MakeRays>
-    HWY_ATTR void meet_instance(const FreePacket& rays, bool any, uint instance, MakeRays& make_rays, PacketHit& hit)
+    HWY_ATTR void meet_instance(const FreePacket& rays, bool any, uint instance, PacketHit& hit)
     {
         const PartRecord& part = image_.parts[image_.instances[instance].part];
         if (part.node_count == 0)
@@ -109,16 +147,14 @@ private:
             project(row_x, row_y, row_z, rays.origin) + scalar3(to.offset[0], to.offset[1], to.offset[2]);
         const real3 direction = project(row_x, row_y, row_z, rays.direction);
         walk(image_.part_nodes.data() + part.first_node, tree_packet(origin, direction), hit, [&](uint leaf) HWY_ATTR {
-            meet_leaf(rays, part.first_leaf + leaf, instance, origin, direction, to.scale * rays.footprint, make_rays,
-                      hit);
+            meet_leaf(rays, part.first_leaf + leaf, instance, origin, direction, to.scale * rays.footprint, hit);
             if (any)
                 hit.best = select(hit.leaf != integer(~0u), real(-kHuge), hit.best);
         });
     }
 
-    template <class MakeRays>
     HWY_ATTR void meet_leaf(const FreePacket& rays, uint leaf_id, uint instance, real3 part_origin,
-                            real3 part_direction, float part_footprint, MakeRays& make_rays, PacketHit& hit)
+                            real3 part_direction, float part_footprint, PacketHit& hit)
     {
         constexpr float kBoxMargin = 1e-6f; // patch units: as for the eye's rays
         const LeafRecord& leaf = image_.leaves[leaf_id];
@@ -142,8 +178,7 @@ private:
         if (!any_lane(alive) || (job_.scene.shared_patch[leaf.patch] && recent_.has(instance, leaf.patch)))
             return;
         work_.free_leaf_visits += lane_count(alive);
-        const Rays free =
-            make_rays(FreeRays{rays.alive && hit.best > -kHuge, from, rounding, part_footprint * per_scale});
+        const FreeRays free{rays.alive && hit.best > -kHuge, from, rounding, part_footprint * per_scale, crossings_};
         FreeMiddles& kept = scratch_.free_middles;
         const size_t slot = leaf_id % FreeMiddles::kCount;
         uint8_t has_middle = kept.leaf[slot] == leaf_id;
@@ -195,7 +230,8 @@ private:
     BlockScratch& scratch_;
     WorkCounts& work_;
     const PackImage& image_;
-    LeafHits<Rays> leaf_hits_;
+    LeafHits<FreeRays> leaf_hits_;
+    Crossings* crossings_ = nullptr;
     RecentPatches recent_;
 };
 
@@ -205,7 +241,6 @@ public:
     FreeTracer(const BlockJob& job, BlockScratch& scratch, const FetchSource& source, WorkCounts& work)
         : section_(job.section), walk_(job, scratch, source, work)
     {
-        walk_.rims_cut() = true;
     }
 
     /// The nearest hits; hit.best is s.
@@ -219,7 +254,7 @@ private:
     {
         if (section_)
             rays.reach = cut_free_ray(*section_, rays.origin, rays.direction, rays.reach);
-        return walk_.trace(rays, any, [](const FreeRays& free) HWY_ATTR { return free; });
+        return walk_.trace(rays, any);
     }
 
     /// Where a ray that begins in what is left leaves it, if that is before `reach`.
@@ -234,7 +269,7 @@ private:
     }
 
     const SectionView* section_;
-    FreeWalk<FreeRays> walk_;
+    FreeWalk walk_;
 };
 
 SHARED_CLOSE

@@ -60,7 +60,7 @@ struct EyeRays {
     static constexpr bool kCollects = false;
     const PatchView& view;
     mask alive;
-    float begin; // `at` of the eye
+    real begin; // `at` of the eye, or of the section plane where the rays begin
 
     float base() const { return view.base_mm; } // `at` of t is base + per_t t
     float per_t() const { return view.mm_per_t; }
@@ -71,14 +71,7 @@ struct EyeRays {
     HWY_ATTR real footprint(real t) const { return view.pixel * (view.tau + t); }
 };
 
-/// Rays from the eye that begin on their way, each elsewhere.
-struct CutRays : EyeRays {
-    real begin_at;
-    HWY_ATTR mask is_ahead(real at) const { return at > begin_at; }
-};
-
-/// Rays: what EyeRays has, and where kCollects is true, collect(taken, at, leaves, tolerance_mm): then every hit goes
-/// there and none is the nearest.
+/// Rays: what EyeRays has, and where kCollects is true, collect: where that takes the hits none is the nearest.
 template <class Rays>
 class LeafHits {
 public:
@@ -399,7 +392,8 @@ private:
                 return;
         }
         if constexpr (Rays::kCollects)
-            return target.rays.collect(taken, at, meets_back(target, normal), target.at, target.face.tolerance_mm);
+            if (target.rays.collect(taken, at, meets_back(target, normal), target.at, target.face.tolerance_mm))
+                return;
         mask back(false);
         if (target.rim) {
             back = meets_back(target, normal);

@@ -23,12 +23,11 @@
 #include <algorithm>
 #include <limits>
 #include <optional>
-#include <type_traits>
 
 SHARED_OPEN
 
-/// Rays: EyeRays, or CutRays where section planes leave a part of each.
-template <class Rays>
+/// kCut: section planes leave a part of each ray.
+template <bool kCut>
 class BlockTracer {
 public:
     BlockTracer(const BlockJob& job, BlockScratch& scratch, Frame& frame, WorkCounts& work)
@@ -94,8 +93,6 @@ public:
     }
 
 private:
-    static constexpr bool kCut = std::is_same_v<Rays, CutRays>;
-
     PixelRect pixel_rect(const Block& block) const
     {
         const float x = 0.5f * float(job_.width), y = 0.5f * float(job_.height);
@@ -211,11 +208,8 @@ private:
         const LeafAt at{candidate.leaf, candidate.instance, &scratch_.leaf_middles[candidate_index],
                         &scratch_.has_middle[candidate_index]};
         const real3 origin = middle + across * real(view.tau), direction = w0 + across;
-        const EyeRays rays{view, packet.alive, -float(job_.view.tau_ref)};
-        if constexpr (kCut)
-            return leaf_hits_.intersect({rays, span_.begin}, at, origin, direction, hit);
-        else
-            return leaf_hits_.intersect(rays, at, origin, direction, hit);
+        const EyeRays rays{view, packet.alive, kCut ? span_.begin : real(-float(job_.view.tau_ref))};
+        return leaf_hits_.intersect(rays, at, origin, direction, hit);
     }
 
     const BlockJob& job_;
@@ -224,7 +218,7 @@ private:
     WorkCounts& work_;
     const PackImage& image_;
     const FetchSource source_;
-    LeafHits<Rays> leaf_hits_;
+    LeafHits<EyeRays> leaf_hits_;
     EdgeFinder edges_;
     std::optional<PacketLight> light_;
     std::optional<CapFinder> caps_;
