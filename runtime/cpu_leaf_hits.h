@@ -59,8 +59,8 @@ struct EyeRays {
     static constexpr bool kCertifies = true; // what stays open of them is told in PacketHit::doubt
     static constexpr bool kCollects = false;
     const PatchView& view;
-    mask alive;
-    real begin; // `at` of the eye, or of the section plane where the rays begin
+    const mask& alive;
+    const real& begin; // `at` of the eye, or of the section plane where the rays begin
 
     float base() const { return view.base_mm; } // `at` of t is base + per_t t
     float per_t() const { return view.mm_per_t; }
@@ -82,7 +82,8 @@ public:
 
     /// Offers the hits of the rays with one leaf: a ray's point at t is origin + t direction, patch space. True if a
     /// ray's nearest hit changed.
-    HWY_ATTR bool intersect(const Rays& rays, const LeafAt& at, real3 origin, real3 direction, PacketHit& hit)
+    HWY_ATTR HWY_INLINE bool intersect(const Rays& rays, const LeafAt& at, const real3& origin, const real3& direction,
+                                       PacketHit& hit)
     {
         const PatchRecord& patch = image_.patches[image_.leaves[at.leaf].patch];
         const FaceRecord& face = image_.faces[patch.face];

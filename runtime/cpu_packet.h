@@ -30,13 +30,14 @@ SHARED_OPEN
 template <bool kCut>
 class BlockTracer {
 public:
-    BlockTracer(const BlockJob& job, BlockScratch& scratch, Frame& frame, WorkCounts& work)
+    HWY_ATTR BlockTracer(const BlockJob& job, BlockScratch& scratch, Frame& frame, WorkCounts& work)
         : job_(job), scratch_(scratch), frame_(frame), work_(work), image_(job.scene.image),
           source_(fetch_source(job.scene.image, job.kd)), leaf_hits_(job, scratch, source_, work),
           edges_(job, scratch, source_, work)
     {
         if (job.light)
             light_.emplace(job, scratch, source_, work);
+        span_.begin = real(-float(job.view.tau_ref));
         if constexpr (kCut)
             caps_.emplace(job, scratch, source_, work);
     }
@@ -208,7 +209,7 @@ private:
         const LeafAt at{candidate.leaf, candidate.instance, &scratch_.leaf_middles[candidate_index],
                         &scratch_.has_middle[candidate_index]};
         const real3 origin = middle + across * real(view.tau), direction = w0 + across;
-        const EyeRays rays{view, packet.alive, kCut ? span_.begin : real(-float(job_.view.tau_ref))};
+        const EyeRays rays{view, packet.alive, span_.begin};
         return leaf_hits_.intersect(rays, at, origin, direction, hit);
     }
 
@@ -222,7 +223,7 @@ private:
     EdgeFinder edges_;
     std::optional<PacketLight> light_;
     std::optional<CapFinder> caps_;
-    CutSpan span_; // of the packet at hand, where kCut
+    CutSpan span_; // of the packet at hand where kCut; else it begins at the eye
     size_t tile_count_ = 0;
     RecentPatches recent_;
     KeptPacket* kept_ = nullptr; // of the packet at hand, where hits are kept from frame to frame

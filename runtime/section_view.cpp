@@ -31,6 +31,8 @@ void store(const Vec3& v, float (&out)[3])
         out[i] = float(v[i]);
 }
 
+constexpr double kMoreCut = 5e-6; // the top tree's units; about 40 roundings of the scene's size in single precision
+
 SectionPlaneView plane_view(const PackImage& image, const SectionPlane& plane, const ViewRays& rays)
 {
     const Vec3 normal = unit(plane.normal);
@@ -39,15 +41,17 @@ SectionPlaneView plane_view(const PackImage& image, const SectionPlane& plane, c
         from_point[i] = rays.eye_mm[i] + rays.tau_ref * rays.w0[i] - plane.point_mm[i];
         from_origin[i] = plane.point_mm[i] - image.world_origin_mm[i];
     }
+    // a little more is cut away than was asked: faces that lie in the plane are gone, whatever rounding does
+    const double more = kMoreCut * image.world_scale_mm;
     SectionPlaneView view{};
-    view.at = float(dot(normal, from_point));
+    view.at = float(dot(normal, from_point) + more);
     view.at_x = float(rays.tau_ref * dot(normal, rays.step_x));
     view.at_y = float(rays.tau_ref * dot(normal, rays.step_y));
     view.rise = float(dot(normal, rays.w0));
     view.rise_x = float(dot(normal, rays.step_x));
     view.rise_y = float(dot(normal, rays.step_y));
     store(normal, view.normal);
-    view.offset = float(dot(normal, from_origin) / image.world_scale_mm);
+    view.offset = float(dot(normal, from_origin) / image.world_scale_mm - kMoreCut);
     // across: horizontal, where the plane is not
     const Vec3 up = std::abs(normal[2]) < 0.9 ? Vec3{0, 0, 1} : Vec3{0, 1, 0};
     const Vec3 across = unit(cross(up, normal));
