@@ -9,6 +9,7 @@
 #include "runtime/light_view.h"
 #include "runtime/stochastic_frames.h"
 #include "runtime/tracer.h"
+#include "shaders/frame_layout.h"
 
 #include <array>
 #include <cstdint>
@@ -35,6 +36,7 @@ struct Strip {
     alignas(64) int32_t face[kBlockSide][kBlockSide];
     alignas(64) int32_t instance[kBlockSide][kBlockSide];
     alignas(64) uint8_t certified[kBlockSide][kBlockSide];
+    std::vector<float> map_value; // kBlockSide a row, where a map measures; otherwise empty
 };
 
 /// A patch as the rays of a view see it.
@@ -94,6 +96,13 @@ struct LightJob {
     std::span<const WorldToPart> to_part; // by instance
 };
 
+/// A map is drawn on surfaces.
+struct MapJob {
+    uint map; // kMap
+    MapView view;
+    bool measures; // Frame::map_value is wanted
+};
+
 struct BlockJob {
     const CpuScene& scene;
     const View& view;
@@ -107,6 +116,7 @@ struct BlockJob {
     const EdgeJob* edges = nullptr;            // null: nobody asks for borders
     const StochasticJob* stochastic = nullptr; // null: ClosestPolicy::Certified
     const LightJob* light = nullptr;           // null: the light at the eye alone
+    const MapJob* map = nullptr;               // null: surfaces have their own colours
 };
 
 /// Traces the block into `frame`, whose arrays have their size.

@@ -13,6 +13,7 @@
 #include "shaders/scene_buffers.glsl"
 
 #include "shaders/shared/bezier.h"
+#include "shaders/shared/bezier_derivatives.h"
 #include "shaders/shared/bvh_node.h"
 #include "shaders/shared/edge.h"
 #include "shaders/shared/language.h"
@@ -24,6 +25,7 @@
 #include "shaders/shared/quadric.h"
 #include "shaders/shared/rim.h"
 #include "shaders/shared/shading.h"
+#include "shaders/shared/surface_map.h"
 #include "shaders/shared/torus.h"
 #include "shaders/shared/trim_kd.h"
 #include "shaders/shared/trim_lookup.h"
@@ -36,6 +38,7 @@
 
 #include "shaders/border_edges.glsl"
 #include "shaders/light.glsl"
+#include "shaders/surface_maps.glsl"
 #include "shaders/work_counts.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
@@ -117,17 +120,23 @@ FramePixel hit_pixel(Hit hit, Ray eye_ray, uint band_pixel)
     result.instance = hit.instance;
     result.status = kPixelHit | (hit.doubt <= hit.past ? 0u : kPixelCertified);
     result.rgba = float[4](0.0f, 0.0f, 0.0f, 1.0f);
+    bool mapped = surface_map != kMapNone;
+    MapColor map;
+    if (mapped)
+        map = map_hit(hit, instance, patch, face, eye_ray, normal, to_eye);
+    if (measures())
+        map_values[band_pixel] = map.value;
     if (has_feature(kFeatureShade)) {
         uint rgba = instance.color_rgba >> 24 != 0u ? instance.color_rgba : kDefaultColor;
         if ((face.flags & kFaceHasColor) != 0u)
             rgba = face.color_rgba;
-        vec3 color;
+        vec3 color = mapped ? map.color : linear_color(rgba);
         if (has_feature(kFeatureLights)) {
-            LitPixel point = lit_pixel(eye_ray.pixel, hit.past, normal, to_eye, linear_color(rgba), kSpecular);
+            LitPixel point = lit_pixel(eye_ray.pixel, hit.past, normal, to_eye, color, kSpecular);
             lit_pixels[band_pixel] = point;
             color = light_without_rays(point);
-        } else
-            color = shade(linear_color(rgba), normal, to_eye);
+        } else if (!mapped || is_lit_map(surface_map))
+            color = shade(color, normal, to_eye);
         result.rgba = float[4](color.x, color.y, color.z, 1.0f);
     }
     return result;
@@ -179,6 +188,8 @@ void main()
             result = hit_pixel(hit, eye_ray, band_pixel);
         else if (has_feature(kFeatureLights))
             lit_pixels[band_pixel].pixel = 0.0f;
+        if (measures() && hit.past >= kHuge)
+            map_values[band_pixel] = 0.0f;
         if (!complete)
             result.status |= kPixelStopped;
         if (has_feature(kFeatureEdges))
