@@ -115,7 +115,7 @@ private:
             job.light = &*light;
         }
         std::optional<MapJob> map;
-        if (const SurfaceMapLook& look = options.look.map; look.map != SurfaceMap::None)
+        if (const SurfaceMapLook& look = options.look.map; has_map(options))
             map = MapJob{uint(look.map), map_view(cpu_scene_->image, look), measures(look.map)};
         job.map = map ? &*map : nullptr;
         const bool effects = has_effects(options);

@@ -135,15 +135,16 @@ void add_drawing(const PackImage& image, const RenderOptions& options, std::vect
 }
 
 /// One item, the map's name.
-void add_map(const SurfaceMapLook& look, std::vector<EffectItem>& plan)
+void add_map(const RenderOptions& options, std::vector<EffectItem>& plan)
 {
-    if (look.map == SurfaceMap::None)
+    const SurfaceMap map = options.look.map.map;
+    if (!has_map(options))
         return;
-    const char* why = look.map == SurfaceMap::Zebra       ? "asked for: stripes mirrored in the surface"
-                      : look.map == SurfaceMap::Isophotes ? "asked for: bands of equal angle to a direction"
-                      : look.map == SurfaceMap::Draft     ? "asked for: angles between surfaces and the pull"
-                                                          : "asked for: curvatures from second derivatives";
-    plan.push_back({surface_map_name(look.map), why});
+    const char* why = map == SurfaceMap::Zebra       ? "asked for: stripes mirrored in surfaces"
+                      : map == SurfaceMap::Isophotes ? "asked for: bands of equal angle to a direction"
+                      : map == SurfaceMap::Draft     ? "asked for: angles between surfaces and the pull"
+                                                     : "asked for: curvatures from second derivatives";
+    plan.push_back({surface_map_name(map), why});
 }
 
 } // namespace
@@ -178,7 +179,7 @@ std::vector<EffectItem> effect_plan(const PackImage& image, const RenderOptions&
                                                   counted(slopes.flagged, "leaf is", "leaves are"), slopes.leaves)});
     if (options.reuse_last && options.closest == ClosestPolicy::Certified)
         plan.push_back({"reused-hits", "asked for: rays search first where the last picture suggests, through Vulkan"});
-    add_map(options.look.map, plan);
+    add_map(options, plan);
     if (options.shade) {
         plan.push_back({"shading", "the picture is asked for, not hits alone"});
         add_drawing(image, options, plan);

@@ -79,6 +79,11 @@ bool measures(SurfaceMap map)
     return is_curvature(map) || map == SurfaceMap::Draft;
 }
 
+bool has_map(const RenderOptions& options)
+{
+    return options.look.map.map != SurfaceMap::None && (options.shade || measures(options.look.map.map));
+}
+
 Status check_map(const PackImage& image, const SurfaceMapLook& look)
 {
     if (look.map == SurfaceMap::None)

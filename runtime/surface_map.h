@@ -5,6 +5,7 @@
 #include "format/pack_image.h"
 #include "format/result.h"
 #include "runtime/scene_look.h"
+#include "runtime/tracer.h"
 #include "shaders/frame_layout.h"
 
 namespace trimray {
@@ -15,6 +16,9 @@ const char* surface_map_name(SurfaceMap map);
 
 /// Whether a map measures something: curvatures and draft do.
 bool measures(SurfaceMap map);
+
+/// Whether a picture computes its map: where it is drawn or measures something.
+bool has_map(const RenderOptions& options);
 
 /// What the ends of a curvature's scale stand for where nobody says: +-kCurvatureRange over the diagonal of the pack's
 /// bounds, Gaussian curvature +- the square of it. A fillet whose radius is a kCurvatureRange-th of the model has full

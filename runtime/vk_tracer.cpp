@@ -223,7 +223,7 @@ Result<ComputePipeline*> VulkanTracer::pipeline(std::span<const uint32_t> spirv,
                                (keeps_hits(options) ? kFeatureKept : 0) | (reuses_hits(options) ? kFeatureReuse : 0) |
                                (is_lit(options) ? kFeatureLights : 0);
     constants[kSpecStackSize] = facts_.stack_size;
-    if (spirv.data() == kPrimarySpirv)
+    if (spirv.data() == kPrimarySpirv && has_map(options))
         constants[kSpecMap] = static_cast<uint32_t>(options.look.map.map);
     if (device_->is_software()) {
         constants[kSpecLocalFloats] = facts_.largest_net_floats <= kMostLocalFloats ? facts_.largest_net_floats : 0;
@@ -339,7 +339,7 @@ Status VulkanTracer::prepare_lights(const RenderOptions& options, const FrameSet
 Status VulkanTracer::prepare_map(const RenderOptions& options, uint32_t rows_per_band)
 {
     const SurfaceMapLook& look = options.look.map;
-    if (look.map == SurfaceMap::None)
+    if (!has_map(options))
         return Done{};
     const MapView settings = map_view(scene_->pack.image, look);
     Result<VulkanBuffer> map = upload_storage(*device_, std::as_bytes(std::span(&settings, 1)), "the map");

@@ -16,8 +16,10 @@
 #include <fstream>
 #include <functional>
 #include <iostream>
+#include <limits>
 #include <numbers>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -478,15 +480,32 @@ Result<Frame> draw_by_vulkan(const std::shared_ptr<const Scene>& scene, const Re
     return (*tracer)->render(options, stats);
 }
 
+/// What a map has formulas for: a torus, a polynomial and a rational patch, also mirrored and smaller. Few kinds, and
+/// no trims: drivers compile them sooner.
+std::shared_ptr<const Scene> curved_kinds()
+{
+    TracedScene scene = octant();
+    scene.add(kKindTorus, 0.3, {-0.5, -0.4, 0.3}, {kPi, kPi}).param[1] = 0.3f;
+    scene.image.faces.back().flags |= kFaceReversed;
+    scene.add_wave(3, {-0.5, 0.5, 0}, 0.4f, 0.5);
+    scene.place({1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0});
+    scene.place({-0.8, 0, 0, 6, 0, 0.8, 0, -6, 0, 0, 0.8, -4});
+    return scene.finish();
+}
+
+std::string test_name(SurfaceMap map)
+{
+    std::string name = surface_map_name(map);
+    std::replace(name.begin(), name.end(), '-', '_');
+    return name;
+}
+
 class surface_maps_of_both : public testing::TestWithParam<SurfaceMap> {};
 
 // The formulas are the same; hits differ by Newton's last step, so values by what they change over that.
 TEST_P(surface_maps_of_both, tracers_agree)
 {
-    TracedScene builder = all_kinds();
-    builder.place({1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0});
-    builder.place({-0.8, 0, 0, 0, 0, 0.8, 0, 12, 0, 0, 0.8, 10}); // mirrored, smaller
-    const auto scene = builder.finish();
+    const auto scene = curved_kinds();
     RenderOptions options = overview(160, 90);
     options.error_px = 1e-4f;
     options.look.map.map = GetParam();
@@ -518,11 +537,7 @@ TEST_P(surface_maps_of_both, tracers_agree)
 
 INSTANTIATE_TEST_SUITE_P(, surface_maps_of_both,
                          testing::Values(SurfaceMap::Zebra, SurfaceMap::CurvatureGaussian, SurfaceMap::Draft),
-                         [](const testing::TestParamInfo<SurfaceMap>& info) {
-                             std::string name = surface_map_name(info.param);
-                             std::replace(name.begin(), name.end(), '-', '_');
-                             return name;
-                         });
+                         [](const testing::TestParamInfo<SurfaceMap>& info) { return test_name(info.param); });
 
 // ---- requests ------------------------------------------------------------------------------------------------------
 
@@ -585,6 +600,61 @@ TEST(surface_map, the_ends_of_a_range_have_the_scales_full_colours)
     EXPECT_GT(blue[2], 3 * blue[0]);
     EXPECT_EQ(color_at(-1, 0.1), red) << "beyond the end";
 }
+
+// ---- pictures that were looked at ----------------------------------------------------------------------------------
+
+/// Kept under golden/. To make them anew, after a change that is meant: TRIMRAY_WRITE_GOLDEN=1
+/// build/tests/surface_map_test --gtest_filter='*golden*', and look at them.
+class golden_maps : public testing::TestWithParam<SurfaceMap> {};
+
+constexpr int kLittle = 3, kMuch = 40;     // levels of 255
+constexpr double kMostOffByLittle = 0.001; // share of pixels that a compiler's other rounding may move
+
+TEST_P(golden_maps, are_drawn_as_they_were)
+{
+    namespace fs = std::filesystem;
+    RenderOptions options = overview(240, 150);
+    options.look.map.map = GetParam();
+    Frame frame = draw(all_kinds().finish(), options).frame;
+    composite_over(frame, {1, 1, 1});
+    const Picture actual = to_picture(frame);
+    const std::string name = fmt::format("map_{}.png", surface_map_name(GetParam()));
+    const fs::path path = fs::path(TRIMRAY_TESTS_DIR) / "golden" / name;
+    const auto write = [](const fs::path& to, const Picture& picture) {
+        const Result<std::vector<std::byte>> bytes = encode_png(picture, PngForm::Fewest);
+        ASSERT_TRUE(bytes.ok());
+        std::ofstream(to, std::ios::binary)
+            .write(reinterpret_cast<const char*>(bytes->data()), static_cast<std::streamsize>(bytes->size()));
+    };
+    if (std::getenv("TRIMRAY_WRITE_GOLDEN") != nullptr)
+        write(path, actual);
+    std::ifstream file(path, std::ios::binary);
+    const std::vector<char> bytes((std::istreambuf_iterator<char>(file)), {});
+    const Result<Picture> golden = decode_png(std::as_bytes(std::span(bytes)));
+    ASSERT_TRUE(golden.ok()) << path;
+    ASSERT_EQ(golden->rgba.size(), actual.rgba.size());
+    Picture difference = actual;
+    size_t little = 0, much = 0;
+    for (size_t i = 0; i < actual.rgba.size(); ++i) {
+        const int off = std::abs(int(actual.rgba[i]) - int(golden->rgba[i]));
+        little += off > kLittle;
+        much += off > kMuch;
+        difference.rgba[i] = i % 4 == 3 ? uint8_t(255) : uint8_t(std::min(255, 4 * off));
+    }
+    EXPECT_EQ(much, 0u);
+    EXPECT_LE(double(little), kMostOffByLittle * double(actual.rgba.size()));
+    if (HasFailure()) {
+        const fs::path folder = fs::temp_directory_path();
+        write(folder / ("actual_" + name), actual);
+        write(folder / ("difference_" + name), difference);
+        std::cout << "expected " << path << "; wrote actual_ and difference_" << name << " to " << folder << "\n";
+    }
+}
+
+INSTANTIATE_TEST_SUITE_P(, golden_maps,
+                         testing::Values(SurfaceMap::Zebra, SurfaceMap::Isophotes, SurfaceMap::CurvatureMean,
+                                         SurfaceMap::CurvatureGaussian, SurfaceMap::Draft),
+                         [](const testing::TestParamInfo<SurfaceMap>& info) { return test_name(info.param); });
 
 TEST(surface_map, pictures_without_a_map_have_no_values)
 {
