@@ -14,9 +14,9 @@
 #include "runtime/cpu_evaluate.h"
 #include "runtime/cpu_fetch.h"
 #include "runtime/cpu_lanes.h"
+#include "runtime/cpu_native.h"
 #include "runtime/cpu_write.h"
 #include "shaders/shared/edge.h"
-#include "shaders/shared/torus.h"
 #include "shaders/shared/trim_lookup.h"
 
 #include <algorithm>
@@ -327,23 +327,6 @@ private:
                        (uv_face.y - patch.uv_offset[1]) * (1 / patch.uv_scale[1]));
         return find_evaluate(patch.shape)(source_, patch.first_control_point, int(patch.shape >> 8 & 0xffu),
                                           int(patch.shape >> 16 & 0xffu), uv);
-    }
-
-    HWY_ATTR Derivatives native_derivatives(const PatchRecord& patch, real3 p) const
-    {
-        const scalar r = patch.param[0], second = patch.param[1];
-        switch (patch.shape & 0xffu) {
-        case kKindCylinder:
-            return cylinder_derivatives(p);
-        case kKindCone:
-            return cone_derivatives(r, second, p);
-        case kKindSphere:
-            return sphere_derivatives(p);
-        case kKindTorus:
-            return torus_derivatives(r, torus_side(r, second, p), p);
-        default:
-            return plane_derivatives();
-        }
     }
 
     static bool is_bezier(const PatchRecord& patch) { return (patch.shape & 0xffu) == kKindBezier; }

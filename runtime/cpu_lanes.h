@@ -10,6 +10,7 @@
 #include "runtime/section_view.h"
 #include "runtime/stochastic_frames.h"
 #include "runtime/tracer.h"
+#include "shaders/frame_layout.h"
 
 #include <array>
 #include <cstdint>
@@ -36,6 +37,7 @@ struct Strip {
     alignas(64) int32_t face[kBlockSide][kBlockSide];
     alignas(64) int32_t instance[kBlockSide][kBlockSide];
     alignas(64) uint8_t certified[kBlockSide][kBlockSide];
+    std::vector<float> map_value; // kBlockSide a row, where a map measures; otherwise empty
 };
 
 /// A patch as the rays of a view see it.
@@ -89,6 +91,13 @@ struct StochasticJob {
     KeptHits* kept;             // null: there is one frame alone
 };
 
+/// A map is drawn on surfaces.
+struct MapJob {
+    uint map; // kMap
+    MapView view;
+    bool measures; // Frame::map_value is wanted
+};
+
 struct BlockJob {
     const CpuScene& scene;
     const View& view;
@@ -105,6 +114,7 @@ struct BlockJob {
     const SectionView* section = nullptr;      // null: nothing is cut away
     const PlaceView* places = nullptr;         // where there is light or a section
     std::span<const WorldToPart> to_part = {}; // by instance, where rays begin elsewhere than at the eye
+    const MapJob* map = nullptr;               // null: surfaces have their own colours
 };
 
 /// Traces the block into `frame`, whose arrays have their size.

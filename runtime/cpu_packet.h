@@ -55,6 +55,8 @@ public:
             offset_x[i] = float(i % 4) + 0.5f - middle_x;
             offset_y[i] = float(i / 4) + 0.5f - middle_y;
         }
+        if (job_.map != nullptr && job_.map->measures)
+            scratch_.strip.map_value.resize(size_t{kBlockSide} * kBlockSide);
         const bool has_borders = job_.edges && edges_.concerns(scratch_.candidates);
         const bool keeps = job_.stochastic && job_.stochastic->kept;
         const bool draws_lines = has_borders && job_.edges->drawer; // once it is traced; until then the block is kept

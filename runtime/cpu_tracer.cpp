@@ -4,6 +4,7 @@
 #include "runtime/frame_size.h"
 #include "runtime/light_view.h"
 #include "runtime/section_view.h"
+#include "runtime/surface_map.h"
 #include "runtime/thread_clock.h"
 #include "runtime/trace_one.h"
 #include "runtime/tracer.h"
@@ -45,6 +46,8 @@ public:
             return trim.error();
         if (const Status drawable = check_effects(options); !drawable.ok())
             return drawable.error();
+        if (const Status mapped = check_map(scene_->pack.image, options.look.map); !mapped.ok())
+            return mapped.error();
         const bool asks_borders = edge_query(options).any() && has_effects(options);
         if (const Status lights = check_lights(options.look); !lights.ok())
             return lights.error();
@@ -69,6 +72,8 @@ public:
             reference_ = std::make_unique<const TrimReference>(scene_->pack.image);
         Frame frame;
         resize(frame, options.width, options.height);
+        if (measures(options.look.map.map))
+            frame.map_value.resize(frame.depth_mm.size());
         const int threads =
             options.threads > 0 ? int(std::min(options.threads, 1024u)) : tbb::info::default_concurrency();
         tbb::task_arena arena(threads);
@@ -121,6 +126,10 @@ private:
         if (is_cut)
             job.section = &section;
         job.to_part = to_part_;
+        std::optional<MapJob> map;
+        if (const SurfaceMapLook& look = options.look.map; has_map(options))
+            map = MapJob{uint(look.map), map_view(cpu_scene_->image, look), measures(look.map)};
+        job.map = map ? &*map : nullptr;
         const bool effects = has_effects(options);
         std::optional<BlockLineDrawer> drawer;
         std::optional<EdgeJob> edges;

@@ -9,6 +9,7 @@
 
 #include "format/pack_layout.h"
 #include "runtime/cpu_lanes.h"
+#include "runtime/cpu_maps.h"
 #include "shaders/shared/language.h"
 #include "shaders/shared/leaf_box.h"
 #include "shaders/shared/shading.h"
@@ -75,12 +76,6 @@ struct PacketShading {
     integer face;
 };
 
-FN real3 to_world(const float (&m)[3][3], real3 n)
-{
-    return real3(m[0][0] * n.x + m[0][1] * n.y + m[0][2] * n.z, m[1][0] * n.x + m[1][1] * n.y + m[1][2] * n.z,
-                 m[2][0] * n.x + m[2][1] * n.y + m[2][2] * n.z);
-}
-
 /// One leaf at a time, in all the lanes that hit it.
 [[maybe_unused]] static HWY_ATTR HWY_NOINLINE PacketShading shade_leaves(const BlockJob& job, const PacketHit& hit,
                                                                          uint hit_lanes)
@@ -102,8 +97,7 @@ FN real3 to_world(const float (&m)[3][3], real3 n)
         const LeafRecord& leaf = image.leaves[leaf_id];
         const PatchRecord& patch = image.patches[leaf.patch];
         const FaceRecord& face = image.faces[patch.face];
-        const float turn =
-            ((face.flags & kFaceReversed) != 0) != (job.scene.left_handed[leaf.patch] != 0) ? -1.0f : 1.0f;
+        const float turn = outward_turn(job.scene, leaf.patch);
         const scalar3 x(patch.axis_x[0], patch.axis_x[1], patch.axis_x[2]);
         const scalar3 y(patch.axis_y[0], patch.axis_y[1], patch.axis_y[2]);
         const scalar3 z(patch.axis_z[0], patch.axis_z[1], patch.axis_z[2]);
@@ -187,6 +181,14 @@ HWY_INLINE void copy_to_strip(const PacketPixels& pixels, uint32_t x, uint32_t y
     }
 }
 
+[[maybe_unused]] static HWY_ATTR void write_values(real value, uint32_t x, uint32_t y, Strip& strip)
+{
+    alignas(64) float values[kLanes];
+    store(value, values);
+    for (uint32_t row = 0; row < 4; ++row)
+        std::memcpy(&strip.map_value[(y + row) * kBlockSide + x], values + 4 * row, 16);
+}
+
 /// memcpy past the caches: a frame is larger than they are, and reading its lines before writing them is half the cost.
 [[maybe_unused]] static HWY_ATTR HWY_INLINE void stream(const void* from, size_t bytes, void* to)
 {
@@ -204,9 +206,19 @@ HWY_INLINE void copy_to_strip(const PacketPixels& pixels, uint32_t x, uint32_t y
     std::memcpy(out + at, in + at, bytes - at);
 }
 
+/// The map's values of a strip to their places, and zeros in their place: packets that miss write none.
+[[maybe_unused]] static void write_strip_values(Strip& strip, uint32_t x, uint32_t y, uint32_t columns, uint32_t rows,
+                                                Frame& frame)
+{
+    for (uint32_t row = 0; row < rows; ++row)
+        std::copy_n(&strip.map_value[size_t(row) * kBlockSide], columns,
+                    &frame.map_value[size_t(y + row) * frame.width + x]);
+    std::fill(strip.map_value.begin(), strip.map_value.end(), 0.0f);
+}
+
 /// The strip's rows to their places: pixels [x, x + columns) of rows [y, y + rows).
-[[maybe_unused]] static HWY_ATTR void write_strip(const Strip& strip, uint32_t x, uint32_t y, uint32_t columns,
-                                                  uint32_t rows, Frame& frame)
+[[maybe_unused]] static HWY_ATTR void write_strip(Strip& strip, uint32_t x, uint32_t y, uint32_t columns, uint32_t rows,
+                                                  Frame& frame)
 {
     for (uint32_t row = 0; row < rows; ++row) {
         const size_t pixel = size_t(y + row) * frame.width + x;
@@ -218,6 +230,8 @@ HWY_INLINE void copy_to_strip(const PacketPixels& pixels, uint32_t x, uint32_t y
         stream(strip.instance[row], columns * 4, &frame.instance[pixel]);
         std::memcpy(&frame.certified[pixel], strip.certified[row], columns);
     }
+    if (!frame.map_value.empty())
+        write_strip_values(strip, x, y, columns, rows, frame);
 }
 
 /// Light: PacketLight (runtime/cpu_light.h); null where there is the light at the eye alone. Caps are hits without a
@@ -237,7 +251,8 @@ HWY_ATTR void write_packet(const BlockJob& job, const Packet& packet, const Pack
         copy_to_strip(kMissedPixels, x, y, strip);
         return;
     }
-    PacketShading shading = shade_leaves(job, hit, caps ? hit_lanes & ~lane_bits(caps->here) : hit_lanes);
+    const uint surface_lanes = caps ? hit_lanes & ~lane_bits(caps->here) : hit_lanes;
+    PacketShading shading = shade_leaves(job, hit, surface_lanes);
     if (caps)
         show_caps(*caps, shading);
     const View& view = job.view;
@@ -254,8 +269,24 @@ HWY_ATTR void write_packet(const BlockJob& job, const Packet& packet, const Pack
     // a surface without a normal faces the eye
     const real3 to_eye = along * (-1.0f / speed);
     normal = select(has_normal, normal, to_eye);
-    const real3 color = light ? light->lit(packet, {hit.best, normal, to_eye, shading.color, real(kSpecular), hits})
-                              : shade(shading.color, normal, to_eye);
+    real3 surface = shading.color;
+    mask glows(false); // pixels whose map is seen as it is
+    if (job.map != nullptr) {
+        const MapHits on_map{packet.x, packet.y, hit.best, hit.leaf, hit.instance, hit.uv_face, normal, to_eye};
+        const MapColor map = map_hits(job, on_map, surface_lanes);
+        const mask mapped = lanes_of(surface_lanes);
+        surface = select(mapped, map.color, surface);
+        if (!is_lit_map(job.map->map))
+            glows = mapped;
+        if (job.map->measures)
+            write_values(select(mapped, map.value, real(0.0f)), x, y, strip);
+    }
+    real3 color = surface;
+    if (any_lane(hits && !glows)) {
+        color = light ? light->lit(packet, {hit.best, normal, to_eye, surface, real(kSpecular), hits && !glows})
+                      : shade(surface, normal, to_eye);
+        color = select(glows, surface, color);
+    }
     const mask certified = hit.doubt >= kHuge || hit.doubt > hit.best;
 
     const real none = real(0.0f);

@@ -1,6 +1,7 @@
 #include "runtime/effect_plan.h"
 
 #include "runtime/leaf_slopes.h"
+#include "runtime/surface_map.h"
 
 #include <fmt/format.h>
 
@@ -133,6 +134,19 @@ void add_drawing(const PackImage& image, const RenderOptions& options, std::vect
         plan.push_back({"unfilled-faces", "asked for: faces show the background"});
 }
 
+/// One item, the map's name.
+void add_map(const RenderOptions& options, std::vector<EffectItem>& plan)
+{
+    const SurfaceMap map = options.look.map.map;
+    if (!has_map(options))
+        return;
+    const char* why = map == SurfaceMap::Zebra       ? "asked for: stripes mirrored in surfaces"
+                      : map == SurfaceMap::Isophotes ? "asked for: bands of equal angle to a direction"
+                      : map == SurfaceMap::Draft     ? "asked for: angles between surfaces and the pull"
+                                                     : "asked for: curvatures from second derivatives";
+    plan.push_back({surface_map_name(map), why});
+}
+
 } // namespace
 
 std::array<uint32_t, kSurfaceKindCount> faces_by_kind(const PackImage& image)
@@ -165,6 +179,7 @@ std::vector<EffectItem> effect_plan(const PackImage& image, const RenderOptions&
                                                   counted(slopes.flagged, "leaf is", "leaves are"), slopes.leaves)});
     if (options.reuse_last && options.closest == ClosestPolicy::Certified)
         plan.push_back({"reused-hits", "asked for: rays search first where the last picture suggests, through Vulkan"});
+    add_map(options, plan);
     if (options.shade) {
         plan.push_back({"shading", "the picture is asked for, not hits alone"});
         add_drawing(image, options, plan);

@@ -23,8 +23,8 @@ std::array<uint32_t, kSurfaceKindCount> faces_by_kind(const PackImage& image);
 /// The name of a surface kind: plane, cylinder, cone, sphere, torus, bezier.
 const char* surface_kind_name(uint kind);
 
-/// The plan, in a fixed order: kinds of patches, trims, placements, colours, search, shading, what is drawn
-/// over it.
+/// The plan, in a fixed order: kinds of patches, trims, placements, colours, search, maps, shading, what is drawn over
+/// it.
 std::vector<EffectItem> effect_plan(const PackImage& image, const RenderOptions& options);
 
 } // namespace trimray

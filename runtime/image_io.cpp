@@ -143,12 +143,14 @@ Result<std::vector<std::byte>> encode_exr(const Frame& frame)
     const Result<const ImageModule*>& module = image_module();
     if (!module.ok())
         return module.error();
-    const std::vector<std::string> channels = {"R",   "G",   "B", "A", "Z",    "N.X",
-                                               "N.Y", "N.Z", "U", "V", "face", "certified"};
+    std::vector<std::string> channels = {"R", "G", "B", "A", "Z", "N.X", "N.Y", "N.Z", "U", "V", "face", "certified"};
+    const bool has_map = !frame.map_value.empty();
+    if (has_map)
+        channels.emplace_back("map");
     const size_t count = static_cast<size_t>(frame.width) * frame.height;
     assert(frame.rgba.size() == count * 4 && frame.depth_mm.size() == count && frame.normal.size() == count * 3 &&
            frame.uv.size() == count * 2 && frame.face.size() == count && frame.certified.size() == count &&
-           "an EXR holds every AOV");
+           (!has_map || frame.map_value.size() == count) && "an EXR holds every AOV");
     std::vector<float> pixels;
     pixels.reserve(count * channels.size());
     for (size_t i = 0; i < count; ++i) {
@@ -158,6 +160,8 @@ Result<std::vector<std::byte>> encode_exr(const Frame& frame)
         pixels.insert(pixels.end(), &frame.uv[i * 2], &frame.uv[i * 2] + 2);
         pixels.push_back(static_cast<float>(frame.face[i]));
         pixels.push_back(static_cast<float>(frame.certified[i]));
+        if (has_map)
+            pixels.push_back(frame.map_value[i]);
     }
     std::vector<std::byte> bytes;
     const std::string failure = (*module)->encode_exr(frame.width, frame.height, channels, pixels.data(), bytes);

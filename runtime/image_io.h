@@ -21,8 +21,8 @@ struct Picture {
 };
 
 /// Writes a frame by the name's ending: .png (sRGB, 8 bits, alpha) or .exr (all AOVs, float channels as DESIGN says:
-/// R G B A Z N.X N.Y N.Z U V face certified, ZIP). Written atomically; the same frame gives the same bytes.
-/// Fails: ImageNotWritten, FileNotWritable, UnsupportedFormat.
+/// R G B A Z N.X N.Y N.Z U V face certified, and map where a map measures; ZIP). Written atomically; the same frame
+/// gives the same bytes. Fails: ImageNotWritten, FileNotWritable, UnsupportedFormat.
 Status write_image(const std::string& path, const Frame& frame);
 
 /// Whether write_image knows the ending of `path`. Fails: UnsupportedFormat, naming those it knows.

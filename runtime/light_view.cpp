@@ -98,15 +98,26 @@ Status check_light(const Light& light, size_t number)
 
 } // namespace
 
+namespace {
+
+/// Bands that a map mirrors in surfaces are seen whatever the lights are.
+bool shows_light(const SceneLook& look)
+{
+    return look.map.map != SurfaceMap::Zebra && look.map.map != SurfaceMap::Isophotes;
+}
+
+} // namespace
+
 bool has_lights(const SceneLook& look)
 {
-    return !look.lights.empty() || look.occlusion.samples > 0 || look.sky;
+    return shows_light(look) && (!look.lights.empty() || look.occlusion.samples > 0 || look.sky);
 }
 
 bool has_light_rays(const SceneLook& look)
 {
-    return look.occlusion.samples > 0 ||
-           std::any_of(look.lights.begin(), look.lights.end(), [](const Light& light) { return light.shadows; });
+    const auto throws_shadows = [](const Light& light) { return light.shadows; };
+    return shows_light(look) &&
+           (look.occlusion.samples > 0 || std::any_of(look.lights.begin(), look.lights.end(), throws_shadows));
 }
 
 Status check_lights(const SceneLook& look)

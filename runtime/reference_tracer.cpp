@@ -60,6 +60,8 @@ public:
             return Error{ErrorCode::Usage, "--device reference",
                          "draws no lines and smooths no borders; leave out --edges, --silhouettes, --style and "
                          "--antialias, or use --device cpu"};
+        if (options.look.map.map != SurfaceMap::None)
+            return Error{ErrorCode::Usage, "--device reference", "draws no maps on surfaces; use --device cpu"};
         if (options.closest == ClosestPolicy::Stochastic)
             return Error{ErrorCode::Usage, "--device reference", "draws no starts; --closest must be certified"};
         if (options.trim == TrimMode::Sdf || options.trim == TrimMode::Hybrid || options.trim == TrimMode::Kd)

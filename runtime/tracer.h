@@ -102,6 +102,9 @@ struct Frame {
     // flagged in the pack, one whose surface the ray grazes, one where Newton ended undecided. Trims are not part of
     // the claim: a ray may pass between two of them by rounding.
     std::vector<uint8_t> certified;
+    // What a map of SceneLook measures, exactly, of every pixel: Gaussian curvature in 1/mm^2, others in 1/mm, draft in
+    // degrees; a miss has 0. Empty without such a map
+    std::vector<float> map_value;
 };
 
 /// Work done per frame, all rays together: a leaf visited by a packet of 16 rays counts 16 times. Counts do not wobble:

@@ -5,6 +5,7 @@
 #include "runtime/light_view.h"
 #include "runtime/section_view.h"
 #include "runtime/stochastic_frames.h"
+#include "runtime/surface_map.h"
 #include "runtime/tracer.h"
 #include "runtime/trim_mode.h"
 #include "runtime/vk_buffer.h"
@@ -46,8 +47,9 @@ constexpr size_t kBandBytes = size_t{32} << 20;
 
 // The software driver ends an invocation's loops in silence after 65,535 iterations. walk() looks at its count after
 // each round, which takes at most 20,000 (kRoundIterations in leaf_hit.glsl); shading takes another 3,400. Edges, where
-// they are wanted, take 12,000 (kEdgeIterations in border_edges.glsl) and a piece more.
-constexpr uint32_t kSoftwareIterationLimit = 42000, kSoftwareIterationLimitWithEdges = 28000;
+// they are wanted, take 12,000 (kEdgeIterations in border_edges.glsl) and a piece more, a map less than kMapIterations:
+// two evaluations of 26 x 26 points and 6 x 350 steps of their polynomials.
+constexpr uint32_t kSoftwareIterationLimit = 42000, kSoftwareIterationLimitWithEdges = 28000, kMapIterations = 6000;
 
 // Pixels whose subgroup reached that limit are traced again, one by one, in dispatches of so many
 constexpr uint32_t kMostRetries = 4096;
@@ -103,6 +105,7 @@ private:
                                       bool count);
     Status prepare_frame(const FrameSetup& setup, uint32_t rows_per_band);
     Status prepare_edges(const RenderOptions& options, uint32_t rows_per_band);
+    Status prepare_map(const RenderOptions& options, uint32_t rows_per_band);
     Status prepare_hits(std::initializer_list<uint32_t> bindings, size_t pixels, size_t pixel_bytes,
                         const char* option);
     Status upload(uint32_t binding, std::span<const std::byte> bytes, const char* name);
@@ -116,6 +119,7 @@ private:
                                  uint32_t groups_y);
     Status read_band(const FrameView& view);
     Status read_edges(const FrameView& view);
+    Status read_values(const FrameView& view, Frame& frame);
     std::vector<uint32_t> stopped_pixels(const FrameView& view) const;
     Result<double> retrace_stopped(const ComputePipeline& pipeline, FrameView view);
     Status set_retries(std::span<const uint32_t> pixels);
@@ -135,8 +139,9 @@ private:
     SceneFacts facts_;
     size_t kd_bytes_ = 0; // of the kd-trees on the device; 0: none yet
     std::array<VulkanBuffer, kFrameBindings> buffers_;
-    VulkanBuffer readback_;       // of a band's pixels
-    VulkanBuffer edges_readback_; // of a band's edge words
+    VulkanBuffer readback_;        // of a band's pixels
+    VulkanBuffer edges_readback_;  // of a band's edge words
+    VulkanBuffer values_readback_; // of what a map measures in a band
     bool edges_wanted_ = false;
     bool has_border_cells_ = false; // on the device, once a picture asked for borders
     EdgeMap edge_map_;
@@ -240,9 +245,12 @@ Result<ComputePipeline*> VulkanTracer::pipeline(std::span<const uint32_t> spirv,
                                (keeps_hits(options) ? kFeatureKept : 0) | (reuses_hits(options) ? kFeatureReuse : 0) |
                                (is_lit(options) ? kFeatureLights : 0) | (is_cut(options) ? kFeatureCut : 0);
     constants[kSpecStackSize] = facts_.stack_size;
+    if (spirv.data() == kPrimarySpirv && has_map(options))
+        constants[kSpecMap] = static_cast<uint32_t>(options.look.map.map);
     if (device_->is_software()) {
         constants[kSpecLocalFloats] = facts_.largest_net_floats <= kMostLocalFloats ? facts_.largest_net_floats : 0;
-        constants[kSpecIterationLimit] = edges_wanted_ ? kSoftwareIterationLimitWithEdges : kSoftwareIterationLimit;
+        constants[kSpecIterationLimit] = (edges_wanted_ ? kSoftwareIterationLimitWithEdges : kSoftwareIterationLimit) -
+                                         (constants[kSpecMap] != kMapNone ? kMapIterations : 0);
     }
     for (MadePipeline& made : pipelines_)
         if (made.spirv == spirv.data() && made.constants == constants)
@@ -360,6 +368,32 @@ Status VulkanTracer::prepare_look(const RenderOptions& options, const FrameSetup
     }
     return device_->is_software() ? prepare_hits({kBindStopped}, band_pixels + 1, sizeof(uint32_t), "free rays")
                                   : Status(Done{});
+}
+
+// Uploads a map's settings and makes the buffers of a band's values. Nothing is made where none is asked for.
+Status VulkanTracer::prepare_map(const RenderOptions& options, uint32_t rows_per_band)
+{
+    const SurfaceMapLook& look = options.look.map;
+    if (!has_map(options))
+        return Done{};
+    const MapView settings = map_view(scene_->pack.image, look);
+    Result<VulkanBuffer> map = upload_storage(*device_, std::as_bytes(std::span(&settings, 1)), "the map");
+    if (!map)
+        return map.error();
+    buffers_[kBindMap] = std::move(*map);
+    const size_t band_pixels = size_t{rows_per_band} * options.width;
+    if (!measures(look.map))
+        return Done{};
+    if (const Status ready = prepare_hits({kBindMapValues}, band_pixels, sizeof(float), "the map"); !ready)
+        return ready;
+    if (values_readback_.size_bytes() >= band_pixels * sizeof(float))
+        return Done{};
+    Result<VulkanBuffer> readback =
+        VulkanBuffer::create(*device_, BufferUse::Readback, band_pixels * sizeof(float), "the map's values");
+    if (!readback)
+        return readback.error();
+    values_readback_ = std::move(*readback);
+    return Done{};
 }
 
 // Makes buffers of one record a pixel, if those there are too small. `option`: what asks for them.
@@ -484,6 +518,27 @@ Status VulkanTracer::read_edges(const FrameView& view)
         device_->vk().vkCmdCopyBuffer(commands, buffers_[kBindEdges].handle(), edges_readback_.handle(), 1, &region);
     });
     return copied.ok() ? edges_readback_.invalidate() : copied;
+}
+
+// Copies a band's values of the map to the frame's rows.
+Status VulkanTracer::read_values(const FrameView& view, Frame& frame)
+{
+    const size_t bytes = size_t{view.width} * view.row_count * sizeof(float);
+    const Status copied = device_->run([&](VkCommandBuffer commands) {
+        const VkBufferCopy region{0, 0, bytes};
+        device_->vk().vkCmdCopyBuffer(commands, buffers_[kBindMapValues].handle(), values_readback_.handle(), 1,
+                                      &region);
+    });
+    if (!copied)
+        return copied;
+    if (const Status seen = values_readback_.invalidate(); !seen)
+        return seen;
+    const size_t first = size_t{view.first_row} * view.width, count = bytes / sizeof(float);
+    std::memcpy(&frame.map_value[first], values_readback_.mapped(), bytes);
+    for (size_t i = first; i < first + count; ++i)
+        if (frame.face[i] < 0) // a cap
+            frame.map_value[i] = 0;
+    return Done{};
 }
 
 // Indices in the band of those whose walk was ended by the iteration limit.
@@ -695,6 +750,9 @@ Result<double> VulkanTracer::trace_frame(const ComputePipeline& pipeline, FrameV
         if (!frame)
             continue;
         take_pixels(view, *frame);
+        if (!frame->map_value.empty())
+            if (const Status read = read_values(view, *frame); !read)
+                return read.error();
         if (!edges_wanted_)
             continue;
         if (const Status read = read_edges(view); !read)
@@ -780,6 +838,8 @@ Result<Frame> VulkanTracer::render(const RenderOptions& options, RenderStats& st
         return lights.error();
     if (const Status section = check_section(options.look.section); !section)
         return section.error();
+    if (const Status mapped = check_map(scene_->pack.image, options.look.map); !mapped)
+        return mapped.error();
     const VkPhysicalDeviceLimits& limits = device_->properties().limits;
     const size_t row_bytes = size_t{options.width} * sizeof(FramePixel);
     const size_t band_bytes = std::min<size_t>(kBandBytes, limits.maxStorageBufferRange);
@@ -800,6 +860,8 @@ Result<Frame> VulkanTracer::render(const RenderOptions& options, RenderStats& st
     if (const Status ready = prepare_edges(options, rows_per_band); !ready)
         return ready.error();
     if (const Status ready = prepare_look(options, *setup, rows_per_band); !ready)
+        return ready.error();
+    if (const Status ready = prepare_map(options, rows_per_band); !ready)
         return ready.error();
     if (const Status ready = prepare_kept(options); !ready)
         return ready.error();
@@ -885,6 +947,8 @@ Result<Frame> VulkanTracer::render(const RenderOptions& options, RenderStats& st
     frame.face.assign(pixels, -1);
     frame.instance.assign(pixels, -1);
     frame.certified.assign(pixels, 0);
+    if (measures(options.look.map.map))
+        frame.map_value.assign(pixels, 0.0f);
     stats = RenderStats{};
     stats.device = device_->name();
     stats.trim = *trim;

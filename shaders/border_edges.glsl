@@ -37,6 +37,21 @@ SurfacePoint bezier_at(PatchRecord patch, vec2 uv_face)
     return bezier_point(patch.first_control_point, int(degree_u), int(degree_v), rational, uv);
 }
 
+Derivatives native_derivatives(uint kind, PatchRecord patch, vec3 p)
+{
+    float r = patch.param[0];
+    float second = patch.param[1];
+    if (kind == kKindCylinder && has_kind(kKindCylinder))
+        return cylinder_derivatives(p);
+    if (kind == kKindCone && has_kind(kKindCone))
+        return cone_derivatives(r, second, p);
+    if (kind == kKindSphere && has_kind(kKindSphere))
+        return sphere_derivatives(p);
+    if (kind == kKindTorus && has_kind(kKindTorus))
+        return torus_derivatives(r, torus_side(r, second, p), p);
+    return plane_derivatives();
+}
+
 Measured measured_hit(Hit hit, FrameInstance instance, PatchRecord patch, Ray eye_ray)
 {
     Measured m;
@@ -54,19 +69,11 @@ Measured measured_hit(Hit hit, FrameInstance instance, PatchRecord patch, Ray ey
     m.rows = pixel_rows(ray.direction, step_x, step_y, ray.anchor + hit.t);
     vec2 uv_scale = vec2(patch.uv_scale[0], patch.uv_scale[1]);
     m.native = plane_derivatives();
-    float r = patch.param[0];
     if (m.kind == kKindBezier && has_kind(kKindBezier)) {
         SurfacePoint s = bezier_at(patch, hit.uv_face);
         m.map = pixel_map(m.rows, s.du, s.dv, uv_scale);
     } else {
-        if (m.kind == kKindCylinder && has_kind(kKindCylinder))
-            m.native = cylinder_derivatives(m.p);
-        else if (m.kind == kKindCone && has_kind(kKindCone))
-            m.native = cone_derivatives(r, patch.param[1], m.p);
-        else if (m.kind == kKindSphere && has_kind(kKindSphere))
-            m.native = sphere_derivatives(m.p);
-        else if (m.kind == kKindTorus && has_kind(kKindTorus))
-            m.native = torus_derivatives(r, torus_side(r, patch.param[1], m.p), m.p);
+        m.native = native_derivatives(m.kind, patch, m.p);
         m.map = pixel_map(m.rows, m.native.u, m.native.v, uv_scale);
     }
     m.line_strength = view.line_width_px > 0.0f ? line_strength(seen_thickness(m.map), view.line_width_px) : 1.0f;

@@ -93,6 +93,25 @@ struct LastHit {
 };
 TRIMRAY_CONST uint kNoLeaf = 0xffffffffu;
 
+// What is drawn on surfaces (SurfaceMap, runtime/scene_look.h; surface_map.cpp checks that they are the same numbers)
+TRIMRAY_CONST uint kMapNone = 0u;
+TRIMRAY_CONST uint kMapZebra = 1u;
+TRIMRAY_CONST uint kMapIsophotes = 2u;
+TRIMRAY_CONST uint kMapGaussian = 3u;
+TRIMRAY_CONST uint kMapMean = 4u;
+TRIMRAY_CONST uint kMapLarger = 5u;
+TRIMRAY_CONST uint kMapSmaller = 6u;
+TRIMRAY_CONST uint kMapDraft = 7u;
+
+// A map's settings.
+struct MapView {
+    float direction[3]; // unit, world
+    float stripes;      // pairs of bands over half a turn
+    float per_range;    // a curvature's colour is at value * per_range - range_middle of the scale from -1 to 1
+    float range_middle;
+    float draft; // radians
+};
+
 // Sums over a frame as pairs of words, low word first; kCount is the pair.
 TRIMRAY_CONST uint kCountRays = 0u;
 TRIMRAY_CONST uint kCountNodes = 1u;
@@ -111,7 +130,8 @@ TRIMRAY_CONST uint kSpecFeatures = 2u; // kFeature bits
 TRIMRAY_CONST uint kSpecStackSize = 3u;
 TRIMRAY_CONST uint kSpecLocalFloats = 4u; // control points are copied into an array of so many floats; 0: they are not
 TRIMRAY_CONST uint kSpecIterationLimit = 5u; // loop iterations a subgroup may run; 0: no limit
-TRIMRAY_CONST uint kFrameSpecs = 6u;
+TRIMRAY_CONST uint kSpecMap = 6u;            // kMap
+TRIMRAY_CONST uint kFrameSpecs = 7u;
 
 TRIMRAY_CONST uint kTrimByCells = 0u;
 TRIMRAY_CONST uint kTrimByTexture = 1u;
@@ -168,7 +188,9 @@ TRIMRAY_CONST uint kBindLitPixels = 25u; // a LitPixel a pixel of the band
 TRIMRAY_CONST uint kBindStopped = 26u;   // pixels of the band to cast free rays from again: how many, and which
 TRIMRAY_CONST uint kBindSection = 27u;   // SectionView (section_layout.h)
 TRIMRAY_CONST uint kBindCaps = 28u;      // a CapState a pixel of the band
-TRIMRAY_CONST uint kFrameBindings = 29u;
+TRIMRAY_CONST uint kBindMap = 29u;       // a MapView; none without a map
+TRIMRAY_CONST uint kBindMapValues = 30u; // a float a pixel of the band; none without a map that measures
+TRIMRAY_CONST uint kFrameBindings = 31u;
 
 #ifdef __cplusplus
 static_assert(sizeof(FrameView) == 128); // what every device takes
@@ -176,6 +198,7 @@ static_assert(sizeof(FrameInstance) == 144);
 static_assert(sizeof(FramePixel) == 52);
 static_assert(sizeof(KeptHit) == 32);
 static_assert(sizeof(LastHit) == 20);
+static_assert(sizeof(MapView) == 28);
 } // namespace trimray
 #endif
 

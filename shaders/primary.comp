@@ -14,6 +14,7 @@
 #include "shaders/scene_buffers.glsl"
 
 #include "shaders/shared/bezier.h"
+#include "shaders/shared/bezier_derivatives.h"
 #include "shaders/shared/bvh_node.h"
 #include "shaders/shared/edge.h"
 #include "shaders/shared/language.h"
@@ -26,6 +27,7 @@
 #include "shaders/shared/rim.h"
 #include "shaders/shared/section.h"
 #include "shaders/shared/shading.h"
+#include "shaders/shared/surface_map.h"
 #include "shaders/shared/torus.h"
 #include "shaders/shared/trim_kd.h"
 #include "shaders/shared/trim_lookup.h"
@@ -41,6 +43,7 @@
 #include "shaders/places.glsl"
 #include "shaders/light.glsl"
 #include "shaders/section.glsl"
+#include "shaders/surface_maps.glsl"
 #include "shaders/work_counts.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
@@ -116,9 +119,18 @@ FramePixel hit_pixel(Hit hit, Ray eye_ray, uint band_pixel)
     result.instance = hit.instance;
     result.status = kPixelHit | (hit.doubt <= hit.past ? 0u : kPixelCertified);
     result.rgba = float[4](0.0f, 0.0f, 0.0f, 1.0f);
+    bool mapped = surface_map != kMapNone;
+    MapColor map;
+    if (mapped)
+        map = map_hit(hit, instance, patch, face, eye_ray, normal, to_eye);
+    if (measures())
+        map_values[band_pixel] = map.value;
     if (has_feature(kFeatureShade)) {
-        vec3 color = face_color(face, instance);
-        if (has_feature(kFeatureLights)) {
+        vec3 color = mapped ? map.color : face_color(face, instance);
+        if (mapped && !is_lit_map(surface_map)) {
+            if (has_feature(kFeatureLights))
+                lit_pixels[band_pixel].pixel = 0.0f;
+        } else if (has_feature(kFeatureLights)) {
             LitPixel point = lit_pixel(eye_ray.pixel, hit.past, normal, to_eye, color, kSpecular);
             lit_pixels[band_pixel] = point;
             color = light_without_rays(point);
@@ -182,6 +194,8 @@ void main()
             result = hit_pixel(hit, eye_ray, band_pixel);
         else if (has_feature(kFeatureLights))
             lit_pixels[band_pixel].pixel = 0.0f;
+        if (measures() && hit.past >= kHuge)
+            map_values[band_pixel] = 0.0f;
         if (!complete)
             result.status |= kPixelStopped;
         if (has_feature(kFeatureEdges))

@@ -38,6 +38,8 @@ layout(scalar, set = 0, binding = kBindStopped) buffer Stopped
 };
 layout(scalar, set = 0, binding = kBindSection) readonly buffer Section { SectionView section; };
 layout(scalar, set = 0, binding = kBindCaps) buffer Caps { CapState caps[]; };
+layout(scalar, set = 0, binding = kBindMap) readonly buffer Map { MapView map_view[]; };
+layout(scalar, set = 0, binding = kBindMapValues) writeonly buffer MapValues { float map_values[]; };
 layout(scalar, push_constant) uniform View { FrameView view; };
 
 // Specialised to what the pack holds and the frame asks for: what is false here costs no instruction.
@@ -47,6 +49,7 @@ layout(constant_id = kSpecFeatures) const uint features = 0x1ffu;
 layout(constant_id = kSpecStackSize) const uint stack_size = 290u; // 2 trees of kMaxBvhDepth, 3 waiting children a node
 layout(constant_id = kSpecLocalFloats) const uint local_floats = 1u;
 layout(constant_id = kSpecIterationLimit) const uint iteration_limit = 0u;
+layout(constant_id = kSpecMap) const uint surface_map = kMapNone;
 
 // A patch's control points copied beside the invocation, where the driver reads buffers slowly
 const uint local_size = local_floats > 0u ? local_floats : 1u;

@@ -84,6 +84,23 @@ TEST(effect_plan, names_what_is_drawn_and_only_that)
     EXPECT_THAT(names(image, options), testing::ElementsAre("plane"));
 }
 
+TEST(effect_plan, names_a_map_where_it_is_drawn_or_measures)
+{
+    RenderOptions options;
+    for (const auto& [map, name] :
+         {std::pair{SurfaceMap::Zebra, "zebra"}, std::pair{SurfaceMap::Isophotes, "isophotes"},
+          std::pair{SurfaceMap::CurvatureGaussian, "curvature-gaussian"}, std::pair{SurfaceMap::Draft, "draft"}}) {
+        options.look.map.map = map;
+        options.shade = true;
+        EXPECT_THAT(names(bare_plane(), options), testing::ElementsAre("plane", name, "shading"));
+        options.shade = false;
+        if (map == SurfaceMap::Zebra || map == SurfaceMap::Isophotes)
+            EXPECT_THAT(names(bare_plane(), options), testing::ElementsAre("plane"));
+        else
+            EXPECT_THAT(names(bare_plane(), options), testing::ElementsAre("plane", name));
+    }
+}
+
 TEST(effect_plan, names_the_trims_as_they_are_asked_for)
 {
     PackImage image = bare_plane();

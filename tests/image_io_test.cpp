@@ -96,6 +96,26 @@ TEST_F(ImageIo, exr_holds_every_aov_as_it_was)
     }
 }
 
+TEST_F(ImageIo, exr_holds_what_a_map_measured_and_only_then)
+{
+    Frame frame = sample_frame(7, 5);
+    for (uint32_t i = 0; i < 35; ++i)
+        frame.map_value.push_back(frame.face[i] < 0 ? 0.0f : 0.125f * static_cast<float>(i) - 2);
+    ASSERT_TRUE(write_image(path("map.exr"), frame).ok());
+    const auto in = OIIO::ImageInput::open(path("map.exr"));
+    ASSERT_TRUE(in) << OIIO::geterror();
+    EXPECT_THAT(in->spec().channelnames, testing::UnorderedElementsAre("R", "G", "B", "A", "Z", "N.X", "N.Y", "N.Z",
+                                                                       "U", "V", "face", "certified", "map"));
+    std::vector<float> pixels(7 * 5 * 13);
+    ASSERT_TRUE(in->read_image(0, 0, 0, 13, OIIO::TypeDesc::FLOAT, pixels.data()));
+    const size_t map = static_cast<size_t>(in->spec().channelindex("map"));
+    const size_t red = static_cast<size_t>(in->spec().channelindex("R"));
+    for (size_t i = 0; i < 35; ++i) {
+        EXPECT_EQ(pixels[13 * i + map], frame.map_value[i]);
+        EXPECT_EQ(pixels[13 * i + red], frame.rgba[4 * i]);
+    }
+}
+
 TEST_F(ImageIo, png_is_srgb_with_straight_alpha)
 {
     Frame frame;

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -40,6 +41,13 @@ struct OracleHit {
     double u = 0, v = 0; // the kernel's parameters
     bool failed = false; // the kernel threw on a face on the way
     bool hit() const { return face >= 0; }
+};
+
+/// Curvatures of a surface at a point, 1/mm and 1/mm^2 of the world.
+struct KernelCurvatures {
+    double larger = 0, smaller = 0, mean = 0, gaussian = 0;
+    Point normal{}; // unit, world
+    std::string surface;
 };
 
 /// Why a ray of ours and the oracle's disagree.
@@ -97,6 +105,10 @@ public:
 
     /// The closest hit of each ray at distance >= 0.
     std::vector<OracleHit> cast(std::span<const Ray> rays) const;
+
+    /// GeomLProp_SLProps at a hit; positive where the surface bends away from `outward`. Nothing where the kernel finds
+    /// no tangent plane.
+    std::optional<KernelCurvatures> curvatures(const OracleHit& hit, const Point& outward) const;
 
     /// Compares depths of ours (infinite: a miss) with the oracle's and finds a cause for each disagreement.
     Agreement compare(std::span<const Ray> rays, std::span<const float> ours_mm, std::span<const OracleHit> hits) const;

@@ -14,108 +14,11 @@
 #endif
 
 #include "format/pack_layout.h"
+#include "shaders/shared/derivatives.h"
 #include "shaders/shared/language.h"
+#include "shaders/shared/pixel_map.h"
 
 SHARED_OPEN
-
-// ---- derivatives ---------------------------------------------------------------------------------------------------
-// Of a native surface at its point p, patch space, by uv_patch. Parametrisations: pack_layout.h. With rho the signed
-// distance from the axis, (cos u, sin u) = (x, y) / rho.
-struct Derivatives {
-    real3 u;
-    real3 v;
-    real3 uu;
-    real3 uv;
-    real3 vv;
-};
-
-// u turns about the axis on every kind but the plane; S_v = (k x, k y, rise), S_vv = (l x, l y, bend)
-FN Derivatives turned(real3 p, real k, real rise, real l, real bend)
-{
-    real none = real(0.0f);
-    Derivatives s;
-    s.u = real3(-p.y, p.x, none);
-    s.v = real3(k * p.x, k * p.y, rise);
-    s.uu = real3(-p.x, -p.y, none);
-    s.uv = real3(-k * p.y, k * p.x, none);
-    s.vv = real3(l * p.x, l * p.y, bend);
-    return s;
-}
-FN Derivatives plane_derivatives()
-{
-    real3 none = real3(real(0.0f), real(0.0f), real(0.0f));
-    Derivatives s;
-    s.u = real3(real(1.0f), real(0.0f), real(0.0f));
-    s.v = real3(real(0.0f), real(1.0f), real(0.0f));
-    s.uu = none;
-    s.uv = none;
-    s.vv = none;
-    return s;
-}
-FN Derivatives cylinder_derivatives(real3 p)
-{
-    real none = real(0.0f);
-    return turned(p, none, real(1.0f), none, none);
-}
-// S_v = (sin a cos u, sin a sin u, cos a)
-FN Derivatives cone_derivatives(scalar r, scalar tan_a, real3 p)
-{
-    scalar cos_a = 1.0f / sqrt(1.0f + tan_a * tan_a);
-    real rho = r + p.z * tan_a;
-    real none = real(0.0f);
-    return turned(p, tan_a * cos_a / select(abs(rho) > 1e-20f, rho, real(1e-20f)), real(cos_a), none, none);
-}
-// S_v = (-z cos u, -z sin u, rho), S_vv = -S
-FN Derivatives sphere_derivatives(real3 p)
-{
-    real rho = sqrt(p.x * p.x + p.y * p.y);
-    return turned(p, -p.z / max(rho, real(1e-20f)), rho, real(-1.0f), -p.z);
-}
-// S_v = (-z cos u, -z sin u, rho - R), S_vv = -((rho - R) cos u, (rho - R) sin u, z); `side`: torus_side
-FN Derivatives torus_derivatives(scalar R, real side, real3 p)
-{
-    real rho = side * sqrt(p.x * p.x + p.y * p.y);
-    real per_rho = 1.0f / select(abs(rho) > 1e-20f, rho, real(1e-20f));
-    return turned(p, -p.z * per_rho, rho - R, (R - rho) * per_rho, -p.z);
-}
-
-// ---- the map to pixels ---------------------------------------------------------------------------------------------
-struct PixelMap {
-    real2 du; // pixels a unit of uv_face
-    real2 dv;
-};
-
-// A point q = eye + T (w0 + x step_x + y step_y) of patch space is seen at pixel (x, y). With w = w0 + x step_x + y
-// step_y its differential dq = dT w + T (dx step_x + dy step_y) gives
-//     dx = dq . (step_y x w) / (T D),  dy = dq . (w x step_x) / (T D),  D = step_x . (step_y x w)
-struct PixelRows {
-    real3 x; // pixels a unit of patch space
-    real3 y;
-};
-FN PixelRows pixel_rows(real3 w, scalar3 step_x, scalar3 step_y, real T)
-{
-    real3 to_x = cross(real3(step_y), w);
-    real3 to_y = cross(w, real3(step_x));
-    real volume = T * dot(real3(step_x), to_x);
-    real per_volume = 1.0f / select(abs(volume) > 1e-30f, volume, real(1e-30f));
-    PixelRows rows;
-    rows.x = to_x * per_volume;
-    rows.y = to_y * per_volume;
-    return rows;
-}
-FN real2 seen_step(PixelRows rows, real3 dq)
-{
-    return real2(dot(rows.x, dq), dot(rows.y, dq));
-}
-
-// su and sv by uv_patch; uv_scale is the patch's (uv_face a unit of uv_patch)
-FN PixelMap pixel_map(PixelRows rows, real3 su, real3 sv, scalar2 uv_scale)
-{
-    PixelMap map;
-    map.du = seen_step(rows, su) * real(1.0f / uv_scale.x);
-    map.dv = seen_step(rows, sv) * real(1.0f / uv_scale.y);
-    return map;
-}
 
 // Where a point of the surface is seen, from a pixel's middle; kHuge away where the surface has turned round on the way
 // there: beyond a rim nothing is seen of it.
