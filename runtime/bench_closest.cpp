@@ -147,9 +147,9 @@ Result<ClosestReport> bench_closest(const std::shared_ptr<const Scene>& scene, c
         return is_bezier(image.patches[leaf.patch]);
     }));
     for (const std::string& name : options.views) {
-        ViewArguments arguments;
-        arguments.view = name;
-        const Result<Camera> camera = camera_of(arguments, image, options.width, options.height);
+        SceneCamera asked;
+        asked.view = name;
+        const Result<Camera> camera = camera_of(asked, image, options.width, options.height);
         if (!camera.ok())
             return Error{ErrorCode::Usage, "--views", camera.error().detail};
         Result<ClosestView> view = measure_view(name, *camera, scene, *tracers, options, progress);

@@ -116,10 +116,10 @@ Result<Camera> camera_of_view(const std::string& name, const std::shared_ptr<con
                               const TrimBenchOptions& options)
 {
     const PackImage& image = scene->pack.image;
-    ViewArguments arguments;
+    SceneCamera asked;
     const bool close = name == "close-up";
-    arguments.view = close ? "iso" : name;
-    const Result<Camera> whole = camera_of(arguments, image, options.width, options.height);
+    asked.view = close ? "iso" : name;
+    const Result<Camera> whole = camera_of(asked, image, options.width, options.height);
     if (!whole.ok())
         return Error{ErrorCode::Usage, "--views", whole.error().detail + "; or close-up"};
     if (!close)

@@ -1,112 +1,181 @@
 #include "runtime/command_draw.h"
 
 #include "runtime/command_trace.h"
-#include "runtime/frame_effects.h"
-#include "runtime/image_io.h"
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
-#include <charconv>
 #include <cstdint>
 #include <utility>
 
 namespace trimray {
 namespace {
 
-const Choice& edges_choice()
+using Values = std::vector<std::string>;
+
+/// Puts an option's values where a scene file has them. Fails: Usage.
+using Put = Status (*)(const std::string& option, const Values& values, SceneNode& root, const char* path);
+
+Status put_words(const std::string& option, const Values& values, SceneNode& root, const char* path)
 {
-    static const Choice choice{"--edges", {"none", "sharp", "all"}, {"none", "sharp", "all"}};
-    return choice;
+    set_node(root, path, words_node(option, values.back()));
+    return Done{};
 }
 
-const Choice& style_choice()
+/// A list of "key=value,..." objects.
+Status put_pairs(const std::string& option, const Values& values, SceneNode& root, const char* path)
 {
-    static const Choice choice{"--style", {"shaded", "edges-only"}, {"shaded", "edges-only"}};
-    return choice;
+    SceneNode list;
+    list.kind = SceneNode::Kind::Array;
+    list.option = option;
+    for (const std::string& value : values) {
+        Result<SceneNode> pairs = pairs_node(option, value);
+        if (!pairs.ok())
+            return pairs.error();
+        list.items.push_back(std::move(*pairs));
+    }
+    set_node(root, path, std::move(list));
+    return Done{};
 }
 
-const Choice& antialias_choice()
+/// "x,y,z:nx,ny,nz" each.
+Status put_planes(const std::string& option, const Values& values, SceneNode& root, const char* path)
+{
+    SceneNode list;
+    list.kind = SceneNode::Kind::Array;
+    list.option = option;
+    for (const std::string& value : values) {
+        const size_t colon = value.find(':');
+        if (colon == value.npos)
+            return Error{ErrorCode::Usage, option,
+                         fmt::format("expected a point and a normal, x,y,z:nx,ny,nz, found '{}'", value)};
+        SceneNode plane;
+        set_node(plane, "point", words_node(option, value.substr(0, colon)));
+        set_node(plane, "normal", words_node(option, value.substr(colon + 1)));
+        plane.option = option;
+        list.items.push_back(std::move(plane));
+    }
+    set_node(root, path, std::move(list));
+    return Done{};
+}
+
+/// "N" or "N,REACH_MM".
+Status put_occlusion(const std::string& option, const Values& values, SceneNode& root, const char*)
+{
+    const std::string& value = values.back();
+    const size_t comma = value.find(',');
+    set_node(root, "effects.occlusion.samples", words_node(option, value.substr(0, comma)));
+    if (comma != value.npos)
+        set_node(root, "effects.occlusion.reach_mm", words_node(option, value.substr(comma + 1)));
+    return Done{};
+}
+
+Status put_antialias(const std::string& option, const Values& values, SceneNode& root, const char* path)
 {
     static const Choice choice{"--antialias", {"none", "trims"}, {"none", "trims"}};
-    return choice;
+    if (const Status known = check_choice(choice, values.back()); !known.ok())
+        return known;
+    set_node(root, path, words_node(option, values.back() == "trims" ? "true" : "false"));
+    return Done{};
 }
+
+constexpr const char* kDrawing = "Drawing";
+constexpr const char* kLights = "Lights and shadows";
+constexpr const char* kMaterials = "Materials and surroundings";
+constexpr const char* kSections = "Sections and maps";
+
+struct DrawOption {
+    const char* option;
+    const char* path; // of the key
+    Put put;
+    const char* group;
+    const char* help;
+};
+constexpr DrawOption kOptions[] = {
+    {"--edges", "effects.edges.lines", put_words, kDrawing,
+     "Lines along borders of faces: none, sharp (faces meet at an angle, or one ends) or all (smooth ones too) [none; "
+     "sharp in the style edges-only]"},
+    {"--style", "effects.style", put_words, kDrawing,
+     "shaded, or edges-only: faces hide what is behind them, unseen themselves [shaded]"},
+    {"--edge-width", "effects.edges.width_px", put_words, kDrawing,
+     "Width of lines in pixels, the same at every slant [1.5]"},
+    {"--edge-color", "effects.edges.color", put_words, kDrawing,
+     "auto (dark on light faces, light on dark ones), black, white or #rrggbb [auto]"},
+    {"--antialias", "effects.antialias.trims", put_antialias, kDrawing,
+     "none, or trims: borders and rims of faces smoothed at one sample a pixel [none]"},
+    {"--samples", "effects.antialias.samples", put_words, kDrawing,
+     "N x N samples a pixel, averaged (PNG only), N at most 16 [1]"},
+    {"--light", "lights", put_pairs, kLights,
+     "A light, repeatable: direction=x,y,z (the way light goes), position=x,y,z or at_eye=true; color=, strength=, "
+     "half_angle_deg= "
+     "or radius_mm= (its size), shadows=true|false [one light at the eye]"},
+    {"--sky", "sky", put_words, kLights,
+     "Strength of the light from all around, in [0, 100] [1; 3 with --occlusion and no lights]"},
+    {"--shadows", "effects.shadows.kind", put_words, kLights,
+     "none, hard or soft, of all lights; without any, of a sun from the upper left [each light's own]"},
+    {"--light-samples", "effects.shadows.samples", put_words, kLights,
+     "Rays a pixel to each light that has a size [16]"},
+    {"--occlusion", "effects.occlusion", put_occlusion, kLights,
+     "N[,REACH_MM]: ambient occlusion by N rays a pixel; what is farther than REACH_MM hides nothing"},
+    {"--material", "materials", put_pairs, kMaterials,
+     "What faces are made of, repeatable, later ones win: part=NAME or part=#N, faces=1+2+3, pack_color=#rrggbb say "
+     "which; color=, opacity=, mirror=, specular= say what"},
+    {"--xray", "effects.xray", put_words, kMaterials, "Opacity, in [0, 1], of every surface that no rule gives one"},
+    {"--mirror-depth", "effects.mirror_depth", put_words, kMaterials,
+     "Reflections of reflections that are followed [1]"},
+    {"--background", "background", put_words, kMaterials, "transparent, white, black or #rrggbb [transparent]"},
+    {"--environment", "environment", put_words, kMaterials,
+     "A picture all around, .hdr or .exr, equirectangular: seen behind the model and in mirrors"},
+    {"--section", "effects.section.planes", put_planes, kSections,
+     "x,y,z:nx,ny,nz, repeatable: cuts away what lies on the normal's side of a plane"},
+    {"--caps", "effects.section.caps", put_words, kSections, "Cut solids: none, filled or hatched [filled]"},
+    {"--cap-color", "effects.section.cap_color", put_words, kSections,
+     "auto (each part's own), black, white or #rrggbb [auto]"},
+    {"--map", "effects.map.kind", put_words, kSections,
+     "In place of colours: zebra, isophotes, curvature-gaussian, curvature-mean, curvature-max, curvature-min or "
+     "draft"},
+    {"--map-direction", "effects.map.direction", put_words, kSections,
+     "x,y,z: the axis of zebra stripes, the light of isophotes, the pull of draft angles [0,0,1]"},
+    {"--map-range", "effects.map.range", put_words, kSections,
+     "lo,hi: curvatures at the ends of the scale [from the model's size]"},
+    {"--stripes", "effects.map.stripes", put_words, kSections,
+     "Pairs of bands over half a turn, zebra and isophotes [16]"},
+    {"--draft", "effects.map.draft_deg", put_words, kSections, "Draft angle that is in order, in degrees [3]"},
+};
 
 } // namespace
 
 void add_draw_options(CLI::App& command, DrawArguments& arguments)
 {
-    constexpr const char* kGroup = "Drawing";
-    command
-        .add_option("--edges", arguments.edges,
-                    "Lines along borders of faces: none, sharp (faces meet at an angle, or one ends) or all (smooth "
-                    "ones too) [none; sharp in the style edges-only]")
-        ->group(kGroup);
+    for (const DrawOption& option : kOptions) {
+        DrawArguments::Given& given = arguments.given.emplace_back(DrawArguments::Given{option.option, {}});
+        command.add_option(option.option, given.values, option.help)
+            ->expected(1)
+            ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
+            ->group(option.group);
+    }
     command
         .add_flag(
             "--silhouettes,!--no-silhouettes", [&arguments](std::int64_t count) { arguments.silhouettes = count > 0; },
             "Lines where a surface turns away and where a border hides what lies behind [no; yes in the style "
             "edges-only]")
-        ->group(kGroup);
-    command
-        .add_option("--style", arguments.style,
-                    "shaded, or edges-only: faces hide what is behind them, unseen themselves")
-        ->capture_default_str()
-        ->group(kGroup);
-    command.add_option("--edge-width", arguments.edge_width_px, "Width of lines in pixels, the same at every slant")
-        ->capture_default_str()
-        ->group(kGroup);
-    command
-        .add_option("--edge-color", arguments.edge_color,
-                    "auto (dark on light faces, light on dark ones), black, white or #rrggbb")
-        ->capture_default_str()
-        ->group(kGroup);
-    command
-        .add_option("--antialias", arguments.antialias,
-                    "none, or trims: borders and rims of faces smoothed at one sample a pixel")
-        ->capture_default_str()
-        ->group(kGroup);
+        ->group(kDrawing);
 }
 
-Status set_drawing(const DrawArguments& arguments, RenderOptions& options)
+Status read_drawing(const DrawArguments& arguments, SceneRequest& request)
 {
-    const bool edges_only = arguments.style == "edges-only";
-    const std::string edges = arguments.edges.value_or(edges_only ? "sharp" : "none");
-    for (const auto& [choice, value] :
-         {std::pair{&edges_choice(), &edges}, std::pair{&style_choice(), &arguments.style},
-          std::pair{&antialias_choice(), &arguments.antialias}})
-        if (const Status known = check_choice(*choice, *value); !known.ok())
-            return known;
-    const auto color = parse_color("--edge-color", arguments.edge_color, "auto");
-    if (!color.ok())
-        return color.error();
-    options.edges = edges == "all" ? EdgeLines::All : edges == "sharp" ? EdgeLines::Sharp : EdgeLines::None;
-    options.silhouettes = arguments.silhouettes.value_or(edges_only);
-    options.fill = !edges_only;
-    options.edge_width_px = static_cast<float>(arguments.edge_width_px);
-    options.edge_color = *color;
-    options.antialias_trims = arguments.antialias == "trims";
-    if (edges_only && options.edges == EdgeLines::None && !options.silhouettes)
-        return Error{ErrorCode::Usage, "--style", "edges-only without edges and silhouettes draws nothing"};
-    return check_effects(options);
-}
-
-Result<std::optional<std::array<float, 3>>> parse_color(const std::string& option, const std::string& text,
-                                                        const std::string& other)
-{
-    if (text == other)
-        return std::optional<std::array<float, 3>>();
-    const std::string hex = text == "white" ? "#ffffff" : text == "black" ? "#000000" : text;
-    uint32_t rgb = 0;
-    const char* const end = hex.data() + hex.size();
-    if (hex.size() == 7 && hex[0] == '#')
-        if (const auto parsed = std::from_chars(hex.data() + 1, end, rgb, 16);
-            parsed.ec == std::errc() && parsed.ptr == end)
-            return std::optional(std::array<float, 3>{srgb_to_linear(static_cast<float>(rgb >> 16) / 255.0f),
-                                                      srgb_to_linear(static_cast<float>(rgb >> 8 & 0xff) / 255.0f),
-                                                      srgb_to_linear(static_cast<float>(rgb & 0xff) / 255.0f)});
-    return Error{ErrorCode::Usage, option,
-                 fmt::format("expected {}, white, black or #rrggbb, found '{}'", other, text)};
+    SceneNode root;
+    root.kind = SceneNode::Kind::Object;
+    for (size_t i = 0; i < arguments.given.size(); ++i) {
+        const DrawArguments::Given& given = arguments.given[i];
+        if (given.values.empty())
+            continue;
+        if (const Status put = kOptions[i].put(given.option, given.values, root, kOptions[i].path); !put.ok())
+            return put;
+    }
+    if (arguments.silhouettes)
+        set_node(root, "effects.silhouettes", words_node("--silhouettes", *arguments.silhouettes ? "true" : "false"));
+    return read_scene(root, "", request);
 }
 
 } // namespace trimray

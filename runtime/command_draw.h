@@ -1,12 +1,14 @@
-// The options that say what is drawn over the surfaces of a picture: edges, silhouettes, anti-aliased borders.
+// The options that say what is drawn: lines, lights, shadows, materials, maps, sections. Each is a key of a scene file
+// too (SCENE.md); both are read by the same code.
 #pragma once
 
 #include "format/result.h"
-#include "runtime/tracer.h"
+#include "runtime/scene_request.h"
 
-#include <array>
+#include <deque>
 #include <optional>
 #include <string>
+#include <vector>
 
 namespace CLI {
 class App;
@@ -16,21 +18,18 @@ namespace trimray {
 
 /// What is drawn, as the command line says it.
 struct DrawArguments {
-    std::optional<std::string> edges; // none: as the style has it
-    std::optional<bool> silhouettes;  // none: as the style has it
-    std::string style = "shaded", edge_color = "auto", antialias = "none";
-    double edge_width_px = static_cast<double>(RenderOptions{}.edge_width_px);
+    struct Given {
+        std::string option;
+        std::vector<std::string> values; // empty: not given
+    };
+    std::deque<Given> given; // in the order of the help
+    std::optional<bool> silhouettes;
 };
 
 /// Adds the options to a command; they are stored in `arguments`, which must live as long as the command.
 void add_draw_options(CLI::App& command, DrawArguments& arguments);
 
-/// Sets what is drawn. The style edges-only draws sharp edges and silhouettes where nothing else is said.
-/// Fails: Usage.
-Status set_drawing(const DrawArguments& arguments, RenderOptions& options);
-
-/// "white", "black" or "#rrggbb" (sRGB) as linear light; nothing where `text` is `other`. Fails: Usage.
-Result<std::optional<std::array<float, 3>>> parse_color(const std::string& option, const std::string& text,
-                                                        const std::string& other);
+/// Reads the options into `request`, over what a scene file put there. Fails: Usage.
+Status read_drawing(const DrawArguments& arguments, SceneRequest& request);
 
 } // namespace trimray

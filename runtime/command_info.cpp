@@ -43,9 +43,7 @@ Json info_json(const LoadedPack& pack)
     info["bytes_by_section"] = Json::object();
     for (const SectionInfo& section : pack.sections)
         info["bytes_by_section"][section.id] = section.stored_bytes;
-    info["effects"] = Json::array();
-    for (const EffectItem& item : effect_plan(image, {}))
-        info["effects"].push_back({{"name", item.name}, {"why", item.why}});
+    info["effects"] = plan_json(effect_plan(pack_facts(image), {}, DeviceKind::Cpu));
     info["dropped"] = Json::array();
     for (const DroppedFace& face : image.dropped)
         info["dropped"].push_back({{"face", face.face_in_part},
@@ -126,9 +124,8 @@ void print_text(const LoadedPack& pack)
     print_row("in memory", fmt::format("{} bytes: geometry {}, tree {}, exact trims {}, distance textures {}",
                                        bytes.total(), bytes.geometry, bytes.bvh, bytes.trim_exact, bytes.trim_sdf));
     print_sections(pack);
-    fmt::print("\n{:<20}{}\n", "effect", "why");
-    for (const EffectItem& item : effect_plan(image, {}))
-        fmt::print("{:<20}{}\n", item.name, item.why);
+    fmt::print("\n");
+    print_plan(effect_plan(pack_facts(image), {}, DeviceKind::Cpu));
     if (!image.dropped.empty())
         fmt::print("\n{:<8}{:<8}{}\n", "part", "face", "dropped because");
     for (const DroppedFace& face : image.dropped)

@@ -18,6 +18,21 @@ void print_json(const Json& object)
     fmt::print("{}\n", object.dump(-1, ' ', false, Json::error_handler_t::replace));
 }
 
+void print_plan(const EffectPlan& plan)
+{
+    fmt::print("{:<20}{}\n", "effect", "why");
+    for (const EffectItem& item : plan.items)
+        fmt::print("{:<20}{}\n", item.name, item.why);
+}
+
+Json plan_json(const EffectPlan& plan)
+{
+    Json items = Json::array();
+    for (const EffectItem& item : plan.items)
+        items.push_back({{"name", item.name}, {"why", item.why}});
+    return items;
+}
+
 MemoryBytes memory_bytes(const PackImage& image)
 {
     MemoryBytes bytes;

@@ -16,6 +16,10 @@ using Json = nlohmann::ordered_json;
 /// One line, UTF-8; bytes of a name that are not UTF-8 become U+FFFD.
 void print_json(const Json& object);
 
+/// What a scene calls for, a line each; as a list of {name, why}.
+void print_plan(const EffectPlan& plan);
+Json plan_json(const EffectPlan& plan);
+
 /// Bytes a scene's arrays take in memory. geometry: parts, placements, faces, patches, control points; bvh: leaves and
 /// nodes; trim_exact: pieces and cells; trim_sdf: distance textures; trim_kd and
 /// borders (the cells that lines and smoothed trims are looked up in): 0, for they are no part of a pack; render

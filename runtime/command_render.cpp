@@ -2,10 +2,12 @@
 #include "runtime/command_json.h"
 #include "runtime/command_report.h"
 #include "runtime/command_trace.h"
+#include "runtime/command_views.h"
 #include "runtime/commands.h"
 #include "runtime/effect_plan.h"
 #include "runtime/frame_effects.h"
 #include "runtime/image_io.h"
+#include "runtime/materials.h"
 #include "runtime/median.h"
 #include "runtime/trim_mode.h"
 
@@ -13,58 +15,162 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
-#include <cmath>
 #include <memory>
-#include <optional>
 #include <unistd.h>
+#include <utility>
+#include <vector>
 
 namespace trimray {
 namespace {
 
 struct RenderArguments {
     std::string pack, output, size = "1280x720", device = "auto", trim = "auto", closest = "certified", scene;
-    std::string background = "transparent";
     ViewArguments view;
     DrawArguments draw;
-    uint32_t frames = 1, threads = 0, samples = 1;
+    uint32_t frames = 1, threads = 0;
     double error_px = RenderOptions{}.error_px;
-    bool json = false;
+    bool json = false, explain = false;
+};
+
+/// One picture to make.
+struct PictureJob {
+    std::string file, camera; // camera: its name in the file that gives it
+    Camera from;
+};
+
+/// What a picture took.
+struct PictureReport {
+    std::string file, camera;
+    RenderStats stats;
 };
 
 /// Faults of the arguments that need no file to be seen.
 Status check(const RenderArguments& arguments)
 {
-    if (!arguments.scene.empty())
-        return Error{ErrorCode::UnsupportedFormat, "--scene",
-                     "scene files are not in this version; a picture is made from one pack"};
     for (const auto& [choice, value] :
          {std::pair{&device_choice(), &arguments.device}, std::pair{&trim_choice(), &arguments.trim},
           std::pair{&closest_choice(), &arguments.closest}})
         if (const Status known = check_choice(*choice, *value); !known.ok())
             return known;
-    if (const Status named = check_image_name(arguments.output); !named.ok())
-        return named;
-    if (arguments.samples > 1 && !arguments.output.ends_with(".png"))
-        return Error{ErrorCode::Usage, "--samples", "averages colours only: an EXR has one sample a pixel"};
-    if (arguments.samples > 1 && arguments.draw.edge_width_px * arguments.samples > double(kLargestEdgeWidthPx))
-        return Error{ErrorCode::Usage, "--edge-width",
-                     fmt::format("{} pixels of {} x {} samples are more than {} samples across",
-                                 arguments.draw.edge_width_px, arguments.samples, arguments.samples,
-                                 kLargestEdgeWidthPx)};
+    if (arguments.output.empty() && !arguments.explain)
+        return Error{ErrorCode::Usage, "-o", "is required: a picture's name; only --explain alone makes none"};
+    if (!arguments.output.empty())
+        if (const Status named = check_image_name(arguments.output); !named.ok())
+            return named;
     if (!(arguments.error_px > 0 && arguments.error_px <= 1))
         return Error{ErrorCode::Usage, "--error-px",
                      fmt::format("expected a part of a pixel in (0, 1], found {}", arguments.error_px)};
     return Done{};
 }
 
-Json report_json(const RenderArguments& arguments, PictureSize size, const PackImage& image,
-                 const RenderOptions& options, const RenderStats& stats)
+/// The scene file, if there is one, and what options say over it. Fails: as read_scene_file, read_drawing; Usage.
+Result<SceneRequest> read_request(const RenderArguments& arguments)
 {
-    const double median_ms = median(stats.frame_ms);
+    SceneRequest request;
+    if (!arguments.scene.empty()) {
+        Result<SceneRequest> read = read_scene_file(arguments.scene);
+        if (!read.ok())
+            return read.error();
+        request = std::move(*read);
+    }
+    if (const Status drawn = read_drawing(arguments.draw, request); !drawn.ok())
+        return drawn.error();
+    const uint32_t samples = request.samples.value_or(1);
+    if (samples > 1 && !arguments.output.empty() && !arguments.output.ends_with(".png"))
+        return Error{ErrorCode::Usage, "--samples", "averages colours only: an EXR has one sample a pixel"};
+    if (samples > 1 && request.edge_width_px * float(samples) > kLargestEdgeWidthPx)
+        return Error{ErrorCode::Usage, "--edge-width",
+                     fmt::format("{} pixels of {} x {} samples are more than {} samples across", request.edge_width_px,
+                                 samples, samples, kLargestEdgeWidthPx)};
+    return request;
+}
+
+/// What all pictures have in common. Fails: as apply_request, read_environment.
+Result<RenderOptions> common_options(const RenderArguments& arguments, const SceneRequest& request, PictureSize size,
+                                     const PackImage& image)
+{
+    RenderOptions options;
+    if (const Status applied = apply_request(request, diagonal_mm(image), options); !applied.ok())
+        return applied.error();
+    if (request.environment) {
+        Result<Environment> environment = read_environment(*request.environment);
+        if (!environment.ok())
+            return environment.error();
+        options.look.environment = std::make_shared<Environment>(std::move(*environment));
+    }
+    options.width = size.width;
+    options.height = size.height;
+    options.trim = trim_mode(arguments.trim);
+    options.closest = closest_policy(arguments.closest);
+    options.threads = arguments.threads;
+    options.frames = arguments.frames;
+    options.error_px = static_cast<float>(arguments.error_px);
+    return options;
+}
+
+/// The pictures, in order. Fails: as cameras_for and picture_names.
+Result<std::vector<PictureJob>> plan_pictures(const RenderArguments& arguments, const std::vector<SceneCamera>& asked,
+                                              const PackImage& image, PictureSize size)
+{
+    const Result<std::vector<Camera>> cameras = cameras_for(arguments.view, asked, image, size.width, size.height);
+    if (!cameras.ok())
+        return cameras.error();
+    std::vector<std::string> files{arguments.output};
+    if (arguments.view.several() && !arguments.output.empty()) {
+        Result<std::vector<std::string>> names = picture_names(arguments.output, cameras->size());
+        if (!names.ok())
+            return names.error();
+        files = std::move(*names);
+    }
+    files.resize(cameras->size());
+    std::vector<PictureJob> jobs;
+    for (size_t i = 0; i < cameras->size(); ++i)
+        jobs.push_back({files[i], asked.size() == cameras->size() ? asked[i].name : "", (*cameras)[i]});
+    return jobs;
+}
+
+/// Tells of rules that give nothing to anything.
+void note_unmatched_rules(const PackImage& image, const SceneRequest& request)
+{
+    const Result<MaterialTable> table = resolve_materials(image, request.look);
+    if (!table.ok()) // the tracers say so
+        return;
+    for (const size_t rule : table->unmatched)
+        report_note(fmt::format("{}: matches no face of the pack", request.rules[rule]));
+}
+
+Json times_json(const RenderStats& stats)
+{
     const auto [min_ms, max_ms] = std::minmax_element(stats.frame_ms.begin(), stats.frame_ms.end());
-    const WorkCounts& work = stats.work;
+    return {{"median", median(stats.frame_ms)}, {"min", *min_ms}, {"max", *max_ms}};
+}
+
+double rays_per_second(const RenderStats& stats)
+{
+    return static_cast<double>(stats.work.rays) / (median(stats.frame_ms) * 1e-3);
+}
+
+Json work_json(const RenderOptions& options, const WorkCounts& work)
+{
     const double rays = static_cast<double>(std::max<uint64_t>(work.rays, 1));
+    Json json = {{"leaf_visits", static_cast<double>(work.leaf_visits) / rays},
+                 {"newton_steps", static_cast<double>(work.newton_steps) / rays},
+                 {"curve_tests", static_cast<double>(work.curve_tests) / rays}};
+    if (edge_query(options).any())
+        json["edge_tests"] = static_cast<double>(work.edge_tests) / rays;
+    if (work.free_rays > 0) { // of lights, occlusion and mirrors
+        json["free_rays"] = static_cast<double>(work.free_rays) / rays;
+        json["free_leaf_visits"] = static_cast<double>(work.free_leaf_visits) / rays;
+    }
+    return json;
+}
+
+/// One picture's keys are those of the whole; those of several are in a list.
+Json report_json(const RenderArguments& arguments, PictureSize size, const PackImage& image,
+                 const RenderOptions& options, const EffectPlan& plan, const std::vector<PictureReport>& pictures)
+{
+    const bool several = arguments.view.several();
+    const RenderStats& stats = pictures.front().stats;
     Json report;
     report["device"] = stats.device;
     report["width"] = size.width;
@@ -72,40 +178,89 @@ Json report_json(const RenderArguments& arguments, PictureSize size, const PackI
     report["frames"] = arguments.frames;
     report["trim"] = trim_name(stats.trim);
     report["closest"] = arguments.closest;
-    report["ms_per_frame"] = {{"median", median_ms}, {"min", *min_ms}, {"max", *max_ms}};
-    report["rays_per_second"] = static_cast<double>(work.rays) / (median_ms * 1e-3);
+    if (!several) {
+        report["ms_per_frame"] = times_json(stats);
+        report["rays_per_second"] = rays_per_second(stats);
+    }
     MemoryBytes bytes = memory_bytes(image);
     bytes.trim_kd = stats.kd_bytes;
     bytes.borders = stats.border_bytes;
     report["bytes"] = to_json(bytes);
     report["effects"] = Json::array();
-    RenderOptions traced = options;
-    traced.trim = stats.trim;
-    for (const EffectItem& item : effect_plan(image, traced))
+    for (const EffectItem& item : plan.items)
         report["effects"].push_back(item.name);
-    report["uncertified_pixels"] = work.uncertified_pixels;
-    report["work"] = {{"leaf_visits", static_cast<double>(work.leaf_visits) / rays},
-                      {"newton_steps", static_cast<double>(work.newton_steps) / rays},
-                      {"curve_tests", static_cast<double>(work.curve_tests) / rays}};
-    if (edge_query(options).any())
-        report["work"]["edge_tests"] = static_cast<double>(work.edge_tests) / rays;
+    if (!several) {
+        report["uncertified_pixels"] = stats.work.uncertified_pixels;
+        report["work"] = work_json(options, stats.work);
+    }
+    if (arguments.explain)
+        report["plan"] = plan_json(plan);
+    if (!several)
+        return report;
+    report["pictures"] = Json::array();
+    for (const PictureReport& picture : pictures)
+        report["pictures"].push_back({{"file", picture.file},
+                                      {"camera", picture.camera},
+                                      {"ms_per_frame", times_json(picture.stats)},
+                                      {"rays_per_second", rays_per_second(picture.stats)},
+                                      {"uncertified_pixels", picture.stats.work.uncertified_pixels},
+                                      {"work", work_json(options, picture.stats.work)}});
     return report;
+}
+
+/// Shows on a terminal what part of the pictures is done.
+class Progress {
+public:
+    Progress(size_t pictures, bool within_each) : pictures_(pictures), within_each_(within_each) {}
+    ~Progress() { clear(); }
+
+    void begin(size_t picture, RenderOptions& options)
+    {
+        if (!terminal_)
+            return;
+        if (pictures_ > 1)
+            fmt::print(stderr, "\r\033[Kpicture {} of {}", picture + 1, pictures_);
+        if (within_each_)
+            options.progress = [](double share) { fmt::print(stderr, "\r\033[K{:.0f} %", 100 * share); };
+    }
+    void clear() const
+    {
+        if (terminal_ && (pictures_ > 1 || within_each_))
+            fmt::print(stderr, "\r\033[K");
+    }
+
+private:
+    size_t pictures_;
+    bool within_each_;
+    bool terminal_ = isatty(STDERR_FILENO) != 0;
+};
+
+/// Traces and writes one picture. Fails: as Tracer::render, write_image.
+Status make_picture(Tracer& tracer, const RenderOptions& options, uint32_t samples, const std::string& file,
+                    RenderStats& stats)
+{
+    Result<Frame> frame = trace_picture(tracer, options, samples, stats);
+    if (!frame.ok())
+        return frame.error();
+    if (options.look.background)
+        composite_over(*frame, *options.look.background);
+    return write_image(file, *frame);
 }
 
 int run_render(const RenderArguments& arguments)
 {
     if (const Status valid = check(arguments); !valid.ok())
         return report_error(valid.error());
-    const Result<PictureSize> size = parse_size(arguments.size, arguments.samples);
+    const Result<SceneRequest> request = read_request(arguments);
+    if (!request.ok())
+        return report_error(request.error());
+    const uint32_t samples = request->samples.value_or(1);
+    const Result<PictureSize> size = parse_size(arguments.size, samples);
     if (!size.ok())
         return report_error(size.error());
-    const auto background = parse_color("--background", arguments.background, "transparent");
-    if (!background.ok())
-        return report_error(background.error());
-
-    RenderOptions options;
-    if (const Status drawn = set_drawing(arguments.draw, options); !drawn.ok())
-        return report_error(drawn.error());
+    const Result<std::vector<SceneCamera>> asked = cameras_asked(arguments.view, request->cameras);
+    if (!asked.ok())
+        return report_error(asked.error());
 
     const Result<std::shared_ptr<const Scene>> scene = load_scene(arguments.pack);
     if (!scene.ok())
@@ -113,9 +268,13 @@ int run_render(const RenderArguments& arguments)
     const PackImage& image = (*scene)->pack.image;
     if (const auto held = choose_trim(image, trim_mode(arguments.trim)); !held.ok() && arguments.device != "reference")
         return report_error(held.error());
-    const Result<Camera> camera = camera_of(arguments.view, image, size->width, size->height);
-    if (!camera.ok())
-        return report_error(camera.error());
+    Result<RenderOptions> options = common_options(arguments, *request, *size, image);
+    if (!options.ok())
+        return report_error(options.error());
+    const Result<std::vector<PictureJob>> jobs = plan_pictures(arguments, *asked, image, *size);
+    if (!jobs.ok())
+        return report_error(jobs.error());
+    note_unmatched_rules(image, *request);
     std::string note;
     const Result<std::unique_ptr<Tracer>> tracer = make_tracer(*scene, arguments.device, note);
     if (!tracer.ok())
@@ -123,29 +282,29 @@ int run_render(const RenderArguments& arguments)
     if (!note.empty())
         report_note(note);
 
-    options.width = size->width;
-    options.height = size->height;
-    options.camera = *camera;
-    options.trim = trim_mode(arguments.trim);
-    options.closest = closest_policy(arguments.closest);
-    options.threads = arguments.threads;
-    options.frames = arguments.frames;
-    options.error_px = static_cast<float>(arguments.error_px);
-    const bool tells_progress = arguments.device == "reference" && isatty(STDERR_FILENO) != 0;
-    if (tells_progress)
-        options.progress = [](double share) { fmt::print(stderr, "\r\033[K{:.0f} %", 100 * share); };
-    RenderStats stats;
-    Result<Frame> frame = trace_picture(**tracer, options, arguments.samples, stats);
-    if (tells_progress)
-        fmt::print(stderr, "\r\033[K");
-    if (!frame.ok())
-        return report_error(frame.error());
-    if (background->has_value())
-        composite_over(*frame, **background);
-    if (const Status written = write_image(arguments.output, *frame); !written.ok())
-        return report_error(written.error());
+    options->camera = jobs->front().from;
+    const EffectPlan plan = effect_plan(pack_facts(image), *options, (*tracer)->device_kind());
+    if (arguments.explain && !arguments.json)
+        print_plan(plan);
+    if (arguments.output.empty()) {
+        if (arguments.json)
+            print_json({{"device", (*tracer)->device_name()}, {"plan", plan_json(plan)}});
+        return kExitOk;
+    }
+    Progress progress(jobs->size(), arguments.device == "reference");
+    std::vector<PictureReport> pictures;
+    for (const PictureJob& job : *jobs) {
+        progress.begin(pictures.size(), *options);
+        options->camera = job.from;
+        PictureReport& picture = pictures.emplace_back(PictureReport{job.file, job.camera, {}});
+        if (const Status made = make_picture(**tracer, *options, samples, job.file, picture.stats); !made.ok()) {
+            progress.clear();
+            return report_error(made.error());
+        }
+    }
+    progress.clear();
     if (arguments.json)
-        print_json(report_json(arguments, *size, image, options, stats));
+        print_json(report_json(arguments, *size, image, *options, plan, pictures));
     return kExitOk;
 }
 
@@ -156,15 +315,12 @@ void register_render(CLI::App& app, int& exit_code)
     CLI::App* command = app.add_subcommand("render", "Trace a pack into a picture");
     const auto a = std::make_shared<RenderArguments>();
     command->add_option("PACK", a->pack, "The scene pack (.tray)")->required();
-    command->add_option("-o,--output", a->output, "The picture: .png (sRGB, alpha) or .exr (floats, all AOVs)")
-        ->required();
+    command->add_option(
+        "-o,--output", a->output,
+        "The picture: .png (sRGB, alpha) or .exr (floats, all AOVs). Of several, a name with %d or %03d, or each "
+        "gets its number");
     command->add_option("--size", a->size, "WIDTHxHEIGHT in pixels")->capture_default_str();
-    auto* view = command->add_option("--view", a->view.view, "iso, front, back, left, right, top or bottom")
-                     ->capture_default_str();
-    command->add_option("--eye", a->view.eye, "x,y,z in mm; the picture is taken from there")->excludes(view);
-    command->add_option("--target", a->view.target, "x,y,z in mm; default: the middle of the model")->excludes(view);
-    command->add_option("--up", a->view.up, "x,y,z; default: 0,0,1")->excludes(view);
-    command->add_option("--fov", a->view.fov_deg, "Vertical field of view in degrees")->capture_default_str();
+    add_view_options(*command, a->view);
     command
         ->add_option("--device", a->device,
                      "auto (a hardware GPU, else the CPU), cpu, vulkan, or reference (in double: "
@@ -186,22 +342,32 @@ void register_render(CLI::App& app, int& exit_code)
     command->add_option("--threads", a->threads, "CPU threads; 0: all cores")
         ->capture_default_str()
         ->check(CLI::Range(0u, 1024u));
-    command->add_option("--samples", a->samples, "N x N samples a pixel, averaged (PNG only)")
-        ->capture_default_str()
-        ->check(CLI::Range(1u, 16u));
-    command->add_option("--background", a->background, "transparent, white, black or #rrggbb")->capture_default_str();
     add_draw_options(*command, a->draw);
-    command->add_option("--scene", a->scene, "A scene file (not in this version)");
+    command->add_option("--scene", a->scene,
+                        "A scene file (JSON): cameras, lights, materials, effects; options win over it");
+    command->add_flag("--explain", a->explain,
+                      "Print what the tracer is made for, and why; without -o no picture is made");
     command->add_flag("--json", a->json, "Print one JSON object: device, times, bytes, effects, work per ray");
-    command->footer("Camera: pinhole, pixel centres at +0.5, row 0 at the top. Without --eye the model is framed whole "
-                    "from --view.\nEXR channels: R G B A Z N.X N.Y N.Z U V face certified.\n\nExamples:\n"
-                    "  trimray render model.tray -o picture.png\n"
-                    "  trimray render model.tray -o picture.png --view front --samples 3 --background white\n"
-                    "  trimray render model.tray -o hits.exr --size 1920x1080 --eye 100,-200,80 --target 0,0,10\n"
-                    "  trimray render model.tray -o picture.png --edges sharp --silhouettes --antialias trims\n"
-                    "  trimray render model.tray -o drawing.png --style edges-only --edge-width 2 --background white\n"
-                    "  trimray render model.tray -o picture.png --closest stochastic --frames 10\n"
-                    "  trimray render model.tray -o picture.png --device cpu --frames 20 --json");
+    command->footer(
+        "Camera: pinhole or parallel rays, pixel centres at +0.5, row 0 at the top. Without --eye the model is framed "
+        "whole from --view.\nEXR channels: R G B A Z N.X N.Y N.Z U V face certified.\n\nExamples:\n"
+        "  trimray render model.tray -o picture.png\n"
+        "  trimray render model.tray -o picture.png --view front --samples 3 --background white\n"
+        "  trimray render model.tray -o hits.exr --size 1920x1080 --eye 100,-200,80 --target 0,0,10\n"
+        "  trimray render model.tray -o plan.png --view top --ortho fit --edges sharp\n"
+        "  trimray render model.tray -o picture.png --edges sharp --silhouettes --antialias trims\n"
+        "  trimray render model.tray -o drawing.png --style edges-only --edge-width 2 --background white\n"
+        "  trimray render model.tray -o picture.png --light direction=1,2,-3,strength=0.9 --shadows soft "
+        "--occlusion 16\n"
+        "  trimray render model.tray -o cut.png --section 0,0,10:0,0,1 --caps hatched\n"
+        "  trimray render model.tray -o parts.png --material part=Cover,opacity=0.3 --material "
+        "pack_color=#ff0000,mirror=0.4\n"
+        "  trimray render model.tray -o zebra.png --map zebra --stripes 20\n"
+        "  trimray render model.tray -o picture.png --scene scene.json\n"
+        "  trimray render model.tray -o turn_%03d.png --turntable 36\n"
+        "  trimray render model.tray --explain --edges sharp --trim sdf\n"
+        "  trimray render model.tray -o picture.png --closest stochastic --frames 10\n"
+        "  trimray render model.tray -o picture.png --device cpu --frames 20 --json");
     command->callback([a, &exit_code] { exit_code = run_render(*a); });
 }
 

@@ -6,7 +6,6 @@
 
 #include <string>
 #include <string_view>
-#include <vector>
 
 namespace trimray {
 
@@ -19,12 +18,5 @@ int report_error(const Error& error);
 
 /// Prints `trimray: <text>` on stderr: what was chosen and why, never an error.
 void report_note(std::string_view text);
-
-/// The candidate nearest to `word` by edits (insert, delete, replace, swap of neighbours), or "" if none is near:
-/// at most a third of the word's letters, at least one, may differ.
-std::string nearest_word(std::string_view word, const std::vector<std::string>& candidates);
-
-/// Three numbers, "x,y,z", finite. Fails: Usage.
-Result<std::vector<double>> parse_numbers(const std::string& option, const std::string& text, size_t count);
 
 } // namespace trimray

@@ -1,7 +1,7 @@
 #include "runtime/command_trace.h"
 
-#include "runtime/command_report.h"
 #include "runtime/image_io.h"
+#include "runtime/nearest_word.h"
 
 #include "format/leaf_geometry.h"
 
@@ -20,14 +20,6 @@ namespace {
 
 // A frame of AOVs takes 53 bytes a pixel: the largest picture takes 14 GB.
 constexpr uint64_t kMaxPixels = uint64_t{1} << 28;
-
-Result<std::array<double, 3>> parse_vector(const std::string& option, const std::string& text)
-{
-    const Result<std::vector<double>> numbers = parse_numbers(option, text, 3);
-    if (!numbers.ok())
-        return numbers.error();
-    return std::array<double, 3>{(*numbers)[0], (*numbers)[1], (*numbers)[2]};
-}
 
 } // namespace
 
@@ -62,10 +54,9 @@ Status check_choice(const Choice& choice, const std::string& value)
         return Error{ErrorCode::UnsupportedFormat, choice.option,
                      fmt::format("'{}' is not in this version; there {} {}", value,
                                  choice.available.size() == 1 ? "is" : "are", fmt::join(choice.available, ", "))};
-    const std::string near = nearest_word(value, choice.known);
     return Error{ErrorCode::Usage, choice.option,
                  fmt::format("expected one of {}, found '{}'{}", fmt::join(choice.known, ", "), value,
-                             near.empty() ? "" : fmt::format("; did you mean '{}'?", near))};
+                             did_you_mean(value, choice.known))};
 }
 
 ClosestPolicy closest_policy(const std::string& name)
@@ -130,50 +121,59 @@ Result<PictureSize> parse_size(const std::string& text, uint32_t samples)
     return size;
 }
 
-Result<Camera> camera_of(const ViewArguments& arguments, const PackImage& image, uint32_t width, uint32_t height)
+Reach model_reach(const PackImage& image)
 {
-    if (!(arguments.fov_deg > 0 && arguments.fov_deg < 180))
-        return Error{ErrorCode::Usage, "--fov",
-                     fmt::format("expected an angle between 0 and 180 degrees, found {}", arguments.fov_deg)};
-    const std::array<double, 3> lo{image.bounds_lo_mm[0], image.bounds_lo_mm[1], image.bounds_lo_mm[2]};
-    const std::array<double, 3> hi{image.bounds_hi_mm[0], image.bounds_hi_mm[1], image.bounds_hi_mm[2]};
+    return [&image](const std::array<double, 3>& direction) {
+        double largest = -std::numeric_limits<double>::infinity();
+        for (const InstanceRecord& instance : image.instances)
+            largest = std::max(largest, largest_along(image, instance, direction));
+        return largest;
+    };
+}
+
+Result<Camera> camera_of(const SceneCamera& asked, const PackImage& image, uint32_t width, uint32_t height)
+{
+    return camera_of(asked, image, model_reach(image), width, height);
+}
+
+Result<Camera> camera_of(const SceneCamera& asked, const PackImage& image, const Reach& framed, uint32_t width,
+                         uint32_t height)
+{
     Camera camera;
-    if (arguments.eye.empty()) {
-        if (!arguments.target.empty() || !arguments.up.empty())
-            return Error{ErrorCode::Usage, arguments.target.empty() ? "--up" : "--target",
-                         "needs --eye x,y,z; without it the model is framed whole from --view"};
+    camera.fov_deg = asked.fov_deg.value_or(camera.fov_deg);
+    camera.orthographic_mm = asked.height_mm.value_or(0);
+    if (!asked.eye) {
         const double aspect = static_cast<double>(width) / height;
-        const Reach reach = [&image](const std::array<double, 3>& direction) {
-            double largest = -std::numeric_limits<double>::infinity();
-            for (const InstanceRecord& instance : image.instances)
-                largest = std::max(largest, largest_along(image, instance, direction));
-            return largest;
-        };
-        if (!standard_view(arguments.view, reach, aspect, arguments.fov_deg, camera))
+        const bool parallel = asked.height_mm || asked.parallel.value_or(false);
+        const bool known = parallel
+                               ? standard_orthographic_view(asked.view, framed, aspect, camera.orthographic_mm, camera)
+                               : standard_view(asked.view, framed, aspect, camera.fov_deg, camera);
+        if (!known)
             return Error{
-                ErrorCode::Usage, "--view",
-                fmt::format("expected one of iso, front, back, left, right, top, bottom, found '{}'", arguments.view)};
+                ErrorCode::Usage, asked.where.empty() ? "--view" : asked.where,
+                fmt::format("expected one of {}, found '{}'", fmt::join(standard_view_names(), ", "), asked.view)};
         return camera;
     }
-    camera.fov_deg = arguments.fov_deg;
+    camera.eye = *asked.eye;
     for (size_t axis = 0; axis < 3; ++axis)
-        camera.target[axis] = 0.5 * (lo[axis] + hi[axis]);
-    camera.up = {0, 0, 1};
-    for (const auto& [option, text, field] :
-         {std::tuple{"--eye", &arguments.eye, &camera.eye}, std::tuple{"--target", &arguments.target, &camera.target},
-          std::tuple{"--up", &arguments.up, &camera.up}}) {
-        if (text->empty())
-            continue;
-        const Result<std::array<double, 3>> vector = parse_vector(option, *text);
-        if (!vector.ok())
-            return vector.error();
-        *field = *vector;
-    }
+        camera.target[axis] =
+            asked.target ? (*asked.target)[axis] : 0.5 * (image.bounds_lo_mm[axis] + image.bounds_hi_mm[axis]);
+    camera.up = asked.up.value_or(std::array<double, 3>{0, 0, 1});
     if (camera.eye == camera.target)
-        return Error{ErrorCode::Usage, "--eye", "is where --target is: there is no direction to look in"};
-    if (camera.up == std::array<double, 3>{0, 0, 0})
-        return Error{ErrorCode::Usage, "--up", "has no length"};
+        return Error{ErrorCode::Usage, asked.where,
+                     "the eye is where the target is (without one, the model's middle): there is no direction to look "
+                     "in"};
     return camera;
+}
+
+double diagonal_mm(const PackImage& image)
+{
+    double square = 0;
+    for (size_t axis = 0; axis < 3; ++axis) {
+        const double side = image.bounds_hi_mm[axis] - image.bounds_lo_mm[axis];
+        square += side * side;
+    }
+    return std::sqrt(square);
 }
 
 Result<Frame> trace_picture(Tracer& tracer, RenderOptions options, uint32_t samples, RenderStats& stats)

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "format/result.h"
+#include "runtime/scene_request.h"
 #include "runtime/tracer.h"
 
 #include <cstdint>
@@ -42,15 +43,18 @@ struct PictureSize {
 /// "WxH" in pixels, each of samples x samples rays. Fails: Usage.
 Result<PictureSize> parse_size(const std::string& text, uint32_t samples);
 
-/// Where the picture is taken from, as the command line says it.
-struct ViewArguments {
-    std::string view = "iso", eye, target, up;
-    double fov_deg = 35;
-};
-
 /// Without an eye: the model framed whole from the named view. Without a target: the middle of the model.
-/// Fails: Usage.
-Result<Camera> camera_of(const ViewArguments& arguments, const PackImage& image, uint32_t width, uint32_t height);
+/// Fails: Usage (no such view; an eye in the model's middle).
+Result<Camera> camera_of(const SceneCamera& asked, const PackImage& image, uint32_t width, uint32_t height);
+/// The same where `framed`, not the model, is framed.
+Result<Camera> camera_of(const SceneCamera& asked, const PackImage& image, const Reach& framed, uint32_t width,
+                         uint32_t height);
+
+/// Of all instances of the pack, which must outlive it.
+Reach model_reach(const PackImage& image);
+
+/// Of the model's bounds.
+double diagonal_mm(const PackImage& image);
 
 /// Traces at samples x samples the resolution and averages (colours only, when samples > 1). The counts in `stats` are
 /// of all samples. Fails: as Tracer::render.

@@ -1,4 +1,5 @@
 #include "runtime/cpu_lanes.h"
+#include "runtime/effect_plan.h"
 #include "runtime/eye_side.h"
 #include "runtime/frame_effects.h"
 #include "runtime/frame_size.h"
@@ -27,6 +28,9 @@
 namespace trimray {
 namespace {
 
+constexpr uint32_t kLookDone =
+    kLookLights | kLookShadows | kLookSoftShadows | kLookOcclusion | kLookMap | kLookSection | kLookCaps;
+
 class CpuTracer final : public Tracer {
 public:
     CpuTracer(std::shared_ptr<const Scene> scene, TraceBlock trace_block, const std::string& instruction_set)
@@ -35,6 +39,7 @@ public:
     {
     }
 
+    DeviceKind device_kind() const override { return DeviceKind::Cpu; }
     std::string device_name() const override { return name_; }
 
     Result<Frame> render(const RenderOptions& options, RenderStats& stats) override
@@ -44,6 +49,8 @@ public:
         const Result<TrimMode> trim = choose_trim(scene_->pack.image, options.trim);
         if (!trim.ok())
             return trim.error();
+        if (const Status done = check_look(options, kLookDone, "cpu"); !done.ok())
+            return done.error();
         if (const Status drawable = check_effects(options); !drawable.ok())
             return drawable.error();
         if (const Status mapped = check_map(scene_->pack.image, options.look.map); !mapped.ok())

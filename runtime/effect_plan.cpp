@@ -1,6 +1,8 @@
 #include "runtime/effect_plan.h"
 
-#include "runtime/leaf_slopes.h"
+#include "runtime/frame_effects.h"
+#include "runtime/light_view.h"
+#include "runtime/stochastic_frames.h"
 #include "runtime/surface_map.h"
 
 #include <fmt/format.h>
@@ -10,44 +12,49 @@
 namespace trimray {
 namespace {
 
+// The software driver ends an invocation's loops in silence after 65,535 iterations. walk() looks at its count after
+// each round, which takes at most 20,000 (kRoundIterations in leaf_hit.glsl); shading takes another 3,400. Edges, where
+// they are wanted, take 12,000 (kEdgeIterations in border_edges.glsl) and a piece more, a map less than kMapIterations:
+// two evaluations of 26 x 26 points and 6 x 350 steps of their polynomials.
+constexpr uint32_t kSoftwareIterationLimit = 42000, kSoftwareIterationLimitWithEdges = 28000, kMapIterations = 6000;
+
+// Larger nets are read from the buffer on the software driver too: so many floats lie beside each invocation
+constexpr uint32_t kMostLocalFloats = 1024;
+
 std::string counted(size_t count, const char* one, const char* many)
 {
     return fmt::format("{} {}", count, count == 1 ? one : many);
 }
 
-template <class Range, class Predicate>
-size_t count_if(const Range& range, Predicate predicate)
+/// The degrees that most patches have: "; 3 x 3: 700, 3 x 1: 12".
+std::string common_degrees(const PackFacts& facts, bool rational)
 {
-    return static_cast<size_t>(std::count_if(range.begin(), range.end(), predicate));
+    constexpr int kMost = 3;
+    std::string text;
+    int told = 0;
+    for (const DegreeCount& degree : facts.degrees)
+        if (degree.rational == rational && told++ < kMost)
+            text +=
+                fmt::format("{} {} x {}: {}", told == 1 ? ';' : ',', degree.degree_u, degree.degree_v, degree.patches);
+    return text;
 }
 
 // What the tracer meets are patches; a file's cylinder may have been converted to Bezier patches.
-void add_surfaces(const PackImage& image, std::vector<EffectItem>& plan)
+void add_surfaces(const PackFacts& facts, std::vector<EffectItem>& items)
 {
-    std::array<size_t, kSurfaceKindCount> native{};
-    size_t rational = 0, polynomial = 0;
-    uint max_degree = 0;
-    for (const PatchRecord& patch : image.patches) {
-        const uint kind = patch.shape & 0xffu;
-        if (kind != kKindBezier) {
-            ++native[kind];
-            continue;
-        }
-        ++((patch.shape & kShapeRational) != 0 ? rational : polynomial);
-        max_degree = std::max({max_degree, (patch.shape >> 8) & 0xffu, (patch.shape >> 16) & 0xffu});
-    }
     for (uint kind = 0; kind < kKindBezier; ++kind)
-        if (native[kind] > 0)
-            plan.push_back({surface_kind_name(kind),
-                            counted(native[kind], "native patch, closed form", "native patches, closed form")});
+        if (facts.patches[kind] > 0)
+            items.push_back({surface_kind_name(kind),
+                             counted(facts.patches[kind], "native patch, closed form", "native patches, closed form")});
+    const size_t rational = facts.rational_patches(), polynomial = facts.bezier_patches() - rational;
     if (polynomial > 0)
-        plan.push_back(
-            {"bezier", fmt::format("{}, degree up to {}", counted(polynomial, "polynomial patch", "polynomial patches"),
-                                   max_degree)});
+        items.push_back({"bezier", fmt::format("{}, degree up to {}{}",
+                                               counted(polynomial, "polynomial patch", "polynomial patches"),
+                                               facts.largest_degree(), common_degrees(facts, false))});
     if (rational > 0)
-        plan.push_back(
-            {"bezier-rational",
-             fmt::format("{}, degree up to {}", counted(rational, "rational patch", "rational patches"), max_degree)});
+        items.push_back({"bezier-rational",
+                         fmt::format("{}, degree up to {}{}", counted(rational, "rational patch", "rational patches"),
+                                     facts.largest_degree(), common_degrees(facts, true))});
 }
 
 const char* trim_effect(TrimMode mode)
@@ -59,83 +66,137 @@ const char* trim_effect(TrimMode mode)
         return "trim-hybrid";
     case TrimMode::Kd:
         return "trim-kd";
-    default: // auto is exact
+    default:
         return "trim-exact";
     }
 }
 
-void add_trims(const PackImage& image, const RenderOptions& options, std::vector<EffectItem>& plan)
+void add_faces(const PackFacts& facts, TrimMode trim, std::vector<EffectItem>& items)
 {
-    const size_t trimmed =
-        count_if(image.faces, [](const FaceRecord& face) { return (face.flags & kFaceNaturalBorder) == 0; });
-    if (trimmed == 0)
-        return;
-    const std::string why = fmt::format("{} of {} have trims that are not their natural border", trimmed,
-                                        counted(image.faces.size(), "face", "faces"));
-    plan.push_back({trim_effect(options.trim), why});
+    if (facts.trimmed_faces > 0)
+        items.push_back({trim_effect(trim), fmt::format("{} of {} have trims that are not their natural border",
+                                                        facts.trimmed_faces, counted(facts.faces, "face", "faces"))});
+    if (facts.rim_faces > 0)
+        items.push_back({"rims", counted(facts.rim_faces, "face reaches beyond its edges, where its back is no surface",
+                                         "faces reach beyond their edges, where their backs are no surface")});
+    if (facts.instances > 1)
+        items.push_back({"instances", fmt::format("{} of {}", counted(facts.instances, "placement", "placements"),
+                                                  counted(facts.parts, "part", "parts"))});
+    if (facts.mirrored_instances > 0)
+        items.push_back({"mirrored-instances", counted(facts.mirrored_instances, "placement is a mirror image",
+                                                       "placements are mirror images")});
+    if (facts.colored_faces > 0)
+        items.push_back(
+            {"face-colors", counted(facts.colored_faces, "face has its own colour", "faces have their own colours")});
+    if (facts.colored_instances > 0)
+        items.push_back(
+            {"instance-colors", counted(facts.colored_instances, "placement has a colour", "placements have colours")});
 }
 
-void add_placements(const PackImage& image, std::vector<EffectItem>& plan)
+void add_search(const PackFacts& facts, const EffectPlan& plan, std::vector<EffectItem>& items)
 {
-    const size_t mirrored = count_if(image.instances, [](const InstanceRecord& instance) {
-        const double* t = instance.transform; // row-major 3x4
-        const double determinant = t[0] * (t[5] * t[10] - t[6] * t[9]) - t[1] * (t[4] * t[10] - t[6] * t[8]) +
-                                   t[2] * (t[4] * t[9] - t[5] * t[8]);
-        return determinant < 0;
-    });
-    if (image.instances.size() > 1)
-        plan.push_back({"instances", fmt::format("{} of {}", counted(image.instances.size(), "placement", "placements"),
-                                                 counted(image.parts.size(), "part", "parts"))});
-    if (mirrored > 0)
-        plan.push_back(
-            {"mirrored-instances", counted(mirrored, "placement is a mirror image", "placements are mirror images")});
-}
-
-void add_colors(const PackImage& image, std::vector<EffectItem>& plan)
-{
-    const size_t faces =
-        count_if(image.faces, [](const FaceRecord& face) { return (face.flags & kFaceHasColor) != 0; });
-    const size_t placements =
-        count_if(image.instances, [](const InstanceRecord& instance) { return (instance.color_rgba >> 24) != 0; });
-    if (faces > 0)
-        plan.push_back({"face-colors", counted(faces, "face has its own colour", "faces have their own colours")});
-    if (placements > 0)
-        plan.push_back({"instance-colors", counted(placements, "placement has a colour", "placements have colours")});
-}
-
-/// Pieces of trims and sides of natural borders, by class.
-std::array<size_t, kEdgeClassCount> edges_by_class(const PackImage& image)
-{
-    std::array<size_t, kEdgeClassCount> counts{};
-    for (const uint word : image.trim_pieces)
-        ++counts[word >> kPieceClassShift & 3u];
-    for (const FaceRecord& face : image.faces)
-        if ((face.flags & kFaceNaturalBorder) != 0)
-            for (uint side = 0; side < 4; ++side)
-                ++counts[face.border_classes >> 2 * side & 3u];
-    return counts;
+    if (plan.stochastic)
+        items.push_back({"stochastic-starts", "asked for: one start a leaf and frame, the nearest hit of all frames"});
+    else if (facts.flagged_leaves > 0)
+        items.push_back(
+            {"leaf-parts", fmt::format("{} flagged, of {}: no ray is proved to meet them once",
+                                       counted(facts.flagged_leaves, "leaf is", "leaves are"), facts.bezier_leaves)});
+    if (plan.reuses_hits)
+        items.push_back({"reused-hits", "asked for: rays search first where the last picture suggests"});
 }
 
 // Lines and blended borders are passes over the frame: their names say what the pass reads.
-void add_drawing(const PackImage& image, const RenderOptions& options, std::vector<EffectItem>& plan)
+void add_drawing(const PackFacts& facts, const RenderOptions& options, std::vector<EffectItem>& items)
 {
-    const std::array<size_t, kEdgeClassCount> edges = edges_by_class(image);
     if (options.edges != EdgeLines::None)
-        plan.push_back({"edges", fmt::format("asked for: {} where faces meet at an angle, {} where one ends",
-                                             counted(edges[kEdgeSharp], "piece", "pieces"), edges[kEdgeFree])});
+        items.push_back(
+            {"edges", fmt::format("asked for: {} where faces meet at an angle, {} where one ends",
+                                  counted(facts.edges[kEdgeSharp], "piece", "pieces"), facts.edges[kEdgeFree])});
     if (options.edges == EdgeLines::All)
-        plan.push_back({"edges-smooth", fmt::format("asked for: {} where faces meet smoothly",
-                                                    counted(edges[kEdgeSmooth], "piece", "pieces"))});
+        items.push_back({"edges-smooth", fmt::format("asked for: {} where faces meet smoothly",
+                                                     counted(facts.edges[kEdgeSmooth], "piece", "pieces"))});
     if (options.silhouettes)
-        plan.push_back({"silhouettes", "asked for: lines where surfaces turn away or hide what lies behind"});
+        items.push_back({"silhouettes", "asked for: lines where surfaces turn away or hide what lies behind"});
     if (options.antialias_trims)
-        plan.push_back({"trim-antialiasing", "asked for: borders and rims blended at one sample a pixel"});
+        items.push_back({"trim-antialiasing", "asked for: borders and rims blended at one sample a pixel"});
     if (!options.fill)
-        plan.push_back({"unfilled-faces", "asked for: faces show the background"});
+        items.push_back({"unfilled-faces", "asked for: faces show the background"});
+}
+
+bool is_soft(const Light& light)
+{
+    return light.shadows && (light.kind == LightKind::Point ? light.radius_mm : light.half_angle_deg) > 0;
+}
+
+template <class Range, class Predicate>
+size_t count_if(const Range& range, Predicate predicate)
+{
+    return static_cast<size_t>(std::count_if(range.begin(), range.end(), predicate));
+}
+
+bool lets_light_through(const MaterialRule& rule)
+{
+    return rule.material.opacity.value_or(1) < 1;
+}
+bool mirrors(const MaterialRule& rule)
+{
+    return rule.material.mirror.value_or(0) > 0;
+}
+
+void add_geometry(uint32_t look, const SceneLook& scene, std::vector<EffectItem>& items)
+{
+    if ((look & kLookOrthographic) != 0)
+        items.push_back({"orthographic", "asked for: parallel rays"});
+    if ((look & kLookSection) != 0)
+        items.push_back({"section", fmt::format("asked for: {}", counted(scene.section.planes.size(),
+                                                                         "plane cuts away what is before it",
+                                                                         "planes cut away what is before them"))});
+    if ((look & kLookCaps) != 0)
+        items.push_back({"caps", scene.section.caps == CapStyle::Hatched ? "asked for: cut solids are hatched"
+                                                                         : "asked for: cut solids are filled"});
+}
+
+void add_look(uint32_t look, const SceneLook& scene, std::vector<EffectItem>& items)
+{
+    if ((look & kLookLights) != 0)
+        items.push_back(
+            {"lights", fmt::format("asked for: {}{}", counted(scene.lights.size(), "light", "lights"),
+                                   scene.sky ? fmt::format(", and a sky of strength {}", *scene.sky) : "")});
+    if ((look & kLookShadows) != 0)
+        items.push_back(
+            {"shadows",
+             fmt::format("asked for: {}", counted(count_if(scene.lights, [](const Light& l) { return l.shadows; }),
+                                                  "light throws shadows", "lights throw shadows"))});
+    if ((look & kLookSoftShadows) != 0)
+        items.push_back(
+            {"soft-shadows", fmt::format("{}, {} a pixel",
+                                         counted(count_if(scene.lights, is_soft), "of these lights has a size",
+                                                 "of these lights have sizes"),
+                                         counted(scene.light_samples, "ray", "rays"))});
+    if ((look & kLookOcclusion) != 0)
+        items.push_back(
+            {"occlusion", fmt::format("asked for: {} a pixel, as far as {} mm",
+                                      counted(scene.occlusion.samples, "ray", "rays"), scene.occlusion.reach_mm)});
+    if ((look & kLookMaterials) != 0)
+        items.push_back({"materials", fmt::format("asked for: {}", counted(scene.materials.size(), "rule", "rules"))});
+    if ((look & kLookTransparency) != 0)
+        items.push_back({"transparency",
+                         scene.xray
+                             ? fmt::format("asked for: opacity {} of all that no rule names", *scene.xray)
+                             : fmt::format("{} opacity below 1", counted(count_if(scene.materials, lets_light_through),
+                                                                         "rule gives an", "rules give an"))});
+    if ((look & kLookMirrors) != 0)
+        items.push_back({"mirrors", fmt::format("{}; {} followed",
+                                                counted(count_if(scene.materials, mirrors), "rule makes a mirror",
+                                                        "rules make mirrors"),
+                                                counted(scene.mirror_depth, "reflection is", "reflections are"))});
+    if ((look & kLookEnvironment) != 0)
+        items.push_back({"environment", fmt::format("asked for: a picture of {} x {}", scene.environment->width,
+                                                    scene.environment->height)});
 }
 
 /// One item, the map's name.
-void add_map(const RenderOptions& options, std::vector<EffectItem>& plan)
+void add_map(const RenderOptions& options, std::vector<EffectItem>& items)
 {
     const SurfaceMap map = options.look.map.map;
     if (!has_map(options))
@@ -144,10 +205,110 @@ void add_map(const RenderOptions& options, std::vector<EffectItem>& plan)
                       : map == SurfaceMap::Isophotes ? "asked for: bands of equal angle to a direction"
                       : map == SurfaceMap::Draft     ? "asked for: angles between surfaces and the pull"
                                                      : "asked for: curvatures from second derivatives";
-    plan.push_back({surface_map_name(map), why});
+    items.push_back({surface_map_name(map), why});
 }
 
 } // namespace
+
+uint32_t look_bits(const RenderOptions& options)
+{
+    const SceneLook& look = options.look;
+    uint32_t bits = 0;
+    const auto add = [&bits](bool wanted, LookBit bit) { bits |= wanted ? bit : 0u; };
+    add(options.camera.orthographic_mm > 0, kLookOrthographic);
+    add(!look.section.planes.empty(), kLookSection);
+    add(!look.section.planes.empty() && look.section.caps != CapStyle::None, kLookCaps);
+    add(has_map(options), kLookMap);
+    if (!options.shade)
+        return bits;
+    const auto any = [](const auto& range, auto predicate) {
+        return std::any_of(range.begin(), range.end(), predicate);
+    };
+    add(!look.lights.empty() || look.sky, kLookLights);
+    add(any(look.lights, [](const Light& light) { return light.shadows; }), kLookShadows);
+    add(any(look.lights, is_soft), kLookSoftShadows);
+    add(look.occlusion.samples > 0, kLookOcclusion);
+    add(any(look.materials, mirrors), kLookMirrors);
+    add(look.xray.value_or(1) < 1 || any(look.materials, lets_light_through), kLookTransparency);
+    add(any(look.materials, [](const MaterialRule& rule) { return rule.material.color || rule.material.specular; }),
+        kLookMaterials);
+    add(look.environment != nullptr, kLookEnvironment);
+    return bits;
+}
+
+Status check_look(const RenderOptions& options, uint32_t done, const std::string& tracer)
+{
+    struct Item {
+        LookBit bit;
+        const char *option, *what;
+    };
+    constexpr Item kItems[kLookBits] = {
+        {kLookLights, "--light", "lights"},
+        {kLookShadows, "--shadows", "shadows"},
+        {kLookSoftShadows, "--shadows", "soft shadows"},
+        {kLookOcclusion, "--occlusion", "rays of ambient occlusion"},
+        {kLookMirrors, "--material", "mirrors"},
+        {kLookTransparency, "--xray", "transparent materials"},
+        {kLookMaterials, "--material", "materials"},
+        {kLookMap, "--map", "maps"},
+        {kLookSection, "--section", "sections"},
+        {kLookCaps, "--caps", "caps of sections"},
+        {kLookEnvironment, "--environment", "environments"},
+        {kLookOrthographic, "--ortho", "parallel rays"},
+    };
+    const uint32_t missing = look_bits(options) & ~done;
+    for (const Item& item : kItems)
+        if ((missing & item.bit) != 0)
+            return Error{ErrorCode::UnsupportedFormat, item.option,
+                         fmt::format("{} are not in this version of the tracer {}", item.what, tracer)};
+    return Done{};
+}
+
+EffectPlan effect_plan(const PackFacts& facts, const RenderOptions& options, DeviceKind device)
+{
+    EffectPlan plan;
+    plan.kinds = facts.kinds();
+    plan.rational = facts.rational_patches() > 0;
+    plan.trims = facts.trimmed_faces > 0;
+    plan.cut = !options.look.section.planes.empty();
+    plan.rims = facts.rim_faces > 0 && !plan.cut; // a section shows the inside
+    plan.trim = options.trim == TrimMode::Auto ? TrimMode::Exact : options.trim;
+    plan.shade = options.shade;
+    plan.edges = has_effects(options) && edge_query(options).any();
+    plan.lit = options.shade && has_lights(options.look);
+    plan.stochastic = options.closest == ClosestPolicy::Stochastic;
+    plan.keeps_hits = keeps_hits(options);
+    const bool vulkan = device == DeviceKind::Vulkan || device == DeviceKind::SoftwareVulkan;
+    plan.reuses_hits = vulkan && options.reuse_last && !plan.stochastic;
+    plan.map = has_map(options) ? options.look.map.map : SurfaceMap::None;
+    plan.look = look_bits(options);
+    plan.stack_size = facts.stack_size;
+    if (device == DeviceKind::SoftwareVulkan) {
+        plan.local_floats = facts.largest_net_floats <= kMostLocalFloats ? facts.largest_net_floats : 0;
+        plan.iteration_limit = (plan.edges ? kSoftwareIterationLimitWithEdges : kSoftwareIterationLimit) -
+                               (plan.map != SurfaceMap::None ? kMapIterations : 0);
+    }
+
+    std::vector<EffectItem>& items = plan.items;
+    add_surfaces(facts, items);
+    add_faces(facts, plan.trim, items);
+    add_search(facts, plan, items);
+    add_geometry(plan.look, options.look, items);
+    add_map(options, items);
+    if (plan.shade) {
+        items.push_back({"shading", "the picture is asked for, not hits alone"});
+        add_drawing(facts, options, items);
+        add_look(plan.look, options.look, items);
+    }
+    if (plan.local_floats > 0)
+        items.push_back({"local-nets", fmt::format("a software driver: control points are copied beside each ray, {} "
+                                                   "floats for the largest patch",
+                                                   plan.local_floats)});
+    if (plan.iteration_limit > 0)
+        items.push_back({"iteration-limit", "a software driver: it ends long loops, so rays that need them are traced "
+                                            "again by themselves"});
+    return plan;
+}
 
 std::array<uint32_t, kSurfaceKindCount> faces_by_kind(const PackImage& image)
 {
@@ -162,29 +323,6 @@ const char* surface_kind_name(uint kind)
     constexpr std::array<const char*, kSurfaceKindCount> names = {"plane",  "cylinder", "cone",
                                                                   "sphere", "torus",    "bezier"};
     return kind < names.size() ? names[kind] : "unknown";
-}
-
-std::vector<EffectItem> effect_plan(const PackImage& image, const RenderOptions& options)
-{
-    std::vector<EffectItem> plan;
-    add_surfaces(image, plan);
-    add_trims(image, options, plan);
-    add_placements(image, plan);
-    add_colors(image, plan);
-    const LeafSlopes slopes = leaf_slopes(image);
-    if (options.closest == ClosestPolicy::Stochastic)
-        plan.push_back({"stochastic-starts", "asked for: one start a leaf and frame, the nearest hit of all frames"});
-    else if (slopes.flagged > 0)
-        plan.push_back({"leaf-parts", fmt::format("{} flagged, of {}: no ray is proved to meet them once",
-                                                  counted(slopes.flagged, "leaf is", "leaves are"), slopes.leaves)});
-    if (options.reuse_last && options.closest == ClosestPolicy::Certified)
-        plan.push_back({"reused-hits", "asked for: rays search first where the last picture suggests, through Vulkan"});
-    add_map(options, plan);
-    if (options.shade) {
-        plan.push_back({"shading", "the picture is asked for, not hits alone"});
-        add_drawing(image, options, plan);
-    }
-    return plan;
 }
 
 } // namespace trimray

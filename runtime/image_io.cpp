@@ -170,6 +170,32 @@ Result<std::vector<std::byte>> encode_exr(const Frame& frame)
     return bytes;
 }
 
+Result<Environment> read_environment(const std::string& path)
+{
+    constexpr uint64_t kMostPixels = uint64_t{1} << 27; // 1.5 GB
+    const std::string extension = ending(path);
+    if (extension != ".hdr" && extension != ".exr")
+        return Error{ErrorCode::UnsupportedFormat, path, "the name of a picture all around must end in .hdr or .exr"};
+    std::error_code failed;
+    if (!fs::is_regular_file(path, failed))
+        return Error{ErrorCode::FileNotFound, path, "no such file"};
+    const Result<const ImageModule*>& module = image_module();
+    if (!module.ok())
+        return module.error();
+    Environment environment;
+    environment.name = path;
+    const std::string failure =
+        (*module)->read_rgb(path, kMostPixels, environment.width, environment.height, environment.rgb);
+    if (!failure.empty())
+        return Error{ErrorCode::InvalidScene, path, failure};
+    for (size_t i = 0; i < environment.rgb.size(); ++i)
+        if (!(environment.rgb[i] >= 0) || !std::isfinite(environment.rgb[i]))
+            return Error{ErrorCode::InvalidScene, path,
+                         fmt::format("pixel ({}, {}): expected a finite colour of at least 0, found {}",
+                                     i / 3 % environment.width, i / 3 / environment.width, environment.rgb[i])};
+    return environment;
+}
+
 Picture to_picture(const Frame& frame)
 {
     Picture picture{frame.width, frame.height, std::vector<uint8_t>(frame.rgba.size())};

@@ -39,6 +39,11 @@ Result<std::vector<std::byte>> encode_exr(const Frame& frame);
 /// Fails: UnsupportedFormat (not a PNG, or a damaged one).
 Result<Picture> decode_png(std::span<const std::byte> bytes);
 
+/// A picture all around: .hdr or .exr, equirectangular, linear light, at most 16,384 x 8,192.
+/// Fails: FileNotFound, UnsupportedFormat (another ending), InvalidScene (no such picture, or colours that are negative
+/// or not finite), ImageNotWritten (the module is missing).
+Result<Environment> read_environment(const std::string& path);
+
 /// The frame's colours for a screen: linear light -> sRGB (IEC 61966-2-1), [0, 1] -> 0..255, nearest.
 Picture to_picture(const Frame& frame);
 

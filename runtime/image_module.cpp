@@ -4,9 +4,11 @@
 #include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 
+#include <algorithm>
 #include <cstring>
 #include <exception>
 #include <memory>
+#include <utility>
 
 namespace trimray {
 namespace {
@@ -30,6 +32,8 @@ std::string encode(const char* format, const OIIO::ImageSpec& spec, OIIO::TypeDe
     return "";
 }
 
+constexpr int kMostChannels = 64; // of a picture that is read
+
 OIIO::ImageSpec spec_of(uint32_t width, uint32_t height, int channels, OIIO::TypeDesc type)
 {
     return {static_cast<int>(width), static_cast<int>(height), channels, type};
@@ -46,6 +50,36 @@ std::string encode_exr(uint32_t width, uint32_t height, const std::vector<std::s
     spec.attribute("oiio:ColorSpace", "Linear");
     spec.attribute("DateTime", ""); // without one OpenImageIO writes the time: the same frame gives the same bytes
     return encode("exr", spec, OIIO::TypeDesc::FLOAT, pixels, bytes);
+}
+
+std::string read_rgb(const std::string& path, uint64_t most_pixels, uint32_t& width, uint32_t& height,
+                     std::vector<float>& rgb)
+{
+    const std::unique_ptr<OIIO::ImageInput> in = OIIO::ImageInput::open(path);
+    if (!in)
+        return OIIO::geterror();
+    const OIIO::ImageSpec& spec = in->spec();
+    if (spec.width < 1 || spec.height < 1 || spec.depth > 1 || spec.deep || spec.nchannels < 1 ||
+        uint64_t(spec.width) * uint64_t(spec.height) > most_pixels || spec.nchannels > kMostChannels)
+        return "is no flat picture of at most " + std::to_string(most_pixels) + " pixels";
+    width = uint32_t(spec.width);
+    height = uint32_t(spec.height);
+    const size_t pixels = size_t(width) * height, channels = size_t(spec.nchannels);
+    const size_t used = channels < 3 ? 1 : 3;
+    const int red = std::max(used == 3 ? spec.channelindex("R") : 0, 0);
+    if (size_t(red) + used > channels)
+        return "has no channels R, G and B in this order";
+    std::vector<float> read(pixels * used);
+    if (!in->read_image(0, 0, red, red + int(used), OIIO::TypeDesc::FLOAT, read.data()))
+        return in->geterror();
+    if (used == 3) {
+        rgb = std::move(read);
+        return "";
+    }
+    rgb.resize(3 * pixels);
+    for (size_t i = 0; i < rgb.size(); ++i)
+        rgb[i] = read[i / 3];
+    return "";
 }
 
 // Nothing thrown leaves the module.
@@ -67,7 +101,7 @@ struct Guarded<function> {
 
 extern "C" __attribute__((visibility("default"))) const ImageModule* trimray_image_module()
 {
-    static const ImageModule module = {TRIMRAY_VERSION, Guarded<encode_exr>::call};
+    static const ImageModule module = {TRIMRAY_VERSION, Guarded<encode_exr>::call, Guarded<read_rgb>::call};
     return &module;
 }
 

@@ -14,6 +14,9 @@ struct ImageModule {
     const char* build; // TRIMRAY_VERSION of the module
     std::string (*encode_exr)(uint32_t width, uint32_t height, const std::vector<std::string>& channels,
                               const float* pixels, std::vector<std::byte>& bytes);
+    // 3 floats a pixel, row 0 at the top; a picture of one channel is grey. Fails beyond `most_pixels`
+    std::string (*read_rgb)(const std::string& path, uint64_t most_pixels, uint32_t& width, uint32_t& height,
+                            std::vector<float>& rgb);
 };
 
 inline constexpr const char* kImageModuleSymbol = "trimray_image_module";

@@ -2,6 +2,7 @@
 #include "format/result.h"
 #include "runtime/command_report.h"
 #include "runtime/commands.h"
+#include "runtime/nearest_word.h"
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>

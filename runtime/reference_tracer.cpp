@@ -1,6 +1,7 @@
 // The reference for closest hits as a tracer: one ray a pixel in double, every AOV, no effects. Slow; what pictures of
 // the other tracers are compared with.
 #include "format/closest_reference.h"
+#include "runtime/effect_plan.h"
 #include "runtime/frame_effects.h"
 #include "runtime/frame_size.h"
 #include "runtime/image_io.h"
@@ -27,6 +28,7 @@ using reference::Vec3;
 using reference::operator*;
 using reference::operator+;
 
+constexpr uint32_t kLookDone = 0;           // LookBit
 constexpr uint kDefaultColor = 0xffb4b0acu; // of what has none, sRGB
 
 /// The colour of a hit, linear light: what shaders/shared/shading.h computes, written anew in double.
@@ -50,6 +52,7 @@ public:
     {
     }
 
+    DeviceKind device_kind() const override { return DeviceKind::Reference; }
     std::string device_name() const override { return "reference"; }
 
     Result<Frame> render(const RenderOptions& options, RenderStats& stats) override
@@ -60,8 +63,8 @@ public:
             return Error{ErrorCode::Usage, "--device reference",
                          "draws no lines and smooths no borders; leave out --edges, --silhouettes, --style and "
                          "--antialias, or use --device cpu"};
-        if (options.look.map.map != SurfaceMap::None)
-            return Error{ErrorCode::Usage, "--device reference", "draws no maps on surfaces; use --device cpu"};
+        if (const Status done = check_look(options, kLookDone, "reference"); !done.ok())
+            return done.error();
         if (options.closest == ClosestPolicy::Stochastic)
             return Error{ErrorCode::Usage, "--device reference", "draws no starts; --closest must be certified"};
         if (options.trim == TrimMode::Sdf || options.trim == TrimMode::Hybrid || options.trim == TrimMode::Kd)

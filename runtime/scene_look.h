@@ -38,7 +38,7 @@ struct Material {
 
 /// Gives `material` to all faces that meet every condition that is set; later rules win, field by field.
 struct MaterialRule {
-    std::optional<std::string> part;    // a part's or a placement's name, or "#N", its number in the pack
+    std::optional<std::string> part;    // a part's or a placement's name, or "#N", the part's number in the pack
     std::vector<uint32_t> faces;        // numbers as `info` and the EXR's `face` have them; empty: all
     std::optional<uint32_t> pack_color; // 0xRRGGBB, sRGB: what the pack paints them with
     Material material;

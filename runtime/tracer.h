@@ -142,9 +142,18 @@ struct RenderStats {
     std::vector<TrimQueries> trim_queries; // of one frame, if asked for; on one thread in the order in which they came
 };
 
+/// What traces, as far as it decides what is traced how.
+enum class DeviceKind {
+    Cpu,
+    Reference,
+    Vulkan,         // a GPU
+    SoftwareVulkan, // a driver that runs shaders on the CPU
+};
+
 class Tracer {
 public:
     virtual ~Tracer() = default;
+    virtual DeviceKind device_kind() const = 0;
     virtual std::string device_name() const = 0;
     virtual Result<Frame> render(const RenderOptions& options, RenderStats& stats) = 0;
 };

@@ -10,6 +10,7 @@
 #include <limits>
 #include <span>
 #include <string>
+#include <utility>
 
 namespace trimray {
 
@@ -63,28 +64,6 @@ BvhNode empty_node()
     return node;
 }
 
-// Nodes on the longest path from the root of a tree. Validation has bounded it by kMaxBvhDepth.
-uint32_t tree_depth(std::span<const BvhNode> nodes)
-{
-    if (nodes.empty())
-        return 1; // the empty node
-    struct Level {
-        uint32_t node;
-        uint32_t depth;
-    };
-    uint32_t deepest = 0;
-    std::vector<Level> waiting{{0, 1}};
-    while (!waiting.empty()) {
-        const Level at = waiting.back();
-        waiting.pop_back();
-        deepest = std::max(deepest, at.depth);
-        for (const uint32_t child : nodes[at.node].child)
-            if (child != kBvhEmpty && !(child & kBvhLeaf))
-                waiting.push_back({child, at.depth + 1});
-    }
-    return deepest;
-}
-
 template <class T>
 std::span<const std::byte> bytes_of(const std::vector<T>& values)
 {
@@ -131,33 +110,28 @@ Status upload_arrays(VulkanDevice& device, std::span<const Array> arrays,
 
 } // namespace
 
-SceneFacts scene_facts(const PackImage& image)
+Specialisation specialisation(const EffectPlan& plan, bool count)
 {
-    SceneFacts facts;
-    for (const PatchRecord& patch : image.patches) {
-        const uint32_t kind = patch.shape & 0xffu;
-        facts.kinds |= 1u << kind;
-        if (kind != kKindBezier)
-            continue;
-        const uint32_t points = (((patch.shape >> 8) & 0xffu) + 1) * (((patch.shape >> 16) & 0xffu) + 1);
-        const bool rational = (patch.shape & kShapeRational) != 0;
-        if (rational)
-            facts.features |= kFeatureRational;
-        facts.largest_net_floats = std::max(facts.largest_net_floats, points * (rational ? 4u : 3u));
-    }
-    for (const FaceRecord& face : image.faces) {
-        if ((face.flags & kFaceNaturalBorder) == 0)
-            facts.features |= kFeatureTrims;
-        if ((face.flags & kFaceRims) != 0)
-            facts.features |= kFeatureRims;
-    }
-    uint32_t part_depth = 1;
-    for (const PartRecord& part : image.parts)
-        part_depth =
-            std::max(part_depth, tree_depth(std::span(image.part_nodes).subspan(part.first_node, part.node_count)));
-    // a visit takes one and leaves up to four, on each level; a root is one; the part's root comes on top
-    facts.stack_size = 3 * (tree_depth(image.top_nodes) + part_depth) + 2;
-    return facts;
+    uint32_t features = 0;
+    for (const auto& [wanted, feature] :
+         {std::pair{plan.trims, kFeatureTrims}, std::pair{plan.rational, kFeatureRational},
+          std::pair{plan.rims, kFeatureRims}, std::pair{plan.shade, kFeatureShade}, std::pair{count, kFeatureCount},
+          std::pair{plan.edges, kFeatureEdges}, std::pair{plan.stochastic, kFeatureStochastic},
+          std::pair{plan.keeps_hits, kFeatureKept}, std::pair{plan.reuses_hits, kFeatureReuse},
+          std::pair{plan.lit, kFeatureLights}, std::pair{plan.cut, kFeatureCut}})
+        features |= wanted ? feature : 0u;
+    Specialisation constants{};
+    constants[kSpecTrimMode] = plan.trim == TrimMode::Sdf      ? kTrimByTexture
+                               : plan.trim == TrimMode::Hybrid ? kTrimByBoth
+                               : plan.trim == TrimMode::Kd     ? kTrimByKd
+                                                               : kTrimByCells;
+    constants[kSpecKinds] = plan.kinds;
+    constants[kSpecFeatures] = features;
+    constants[kSpecStackSize] = plan.stack_size;
+    constants[kSpecLocalFloats] = plan.local_floats;
+    constants[kSpecIterationLimit] = plan.iteration_limit;
+    constants[kSpecMap] = static_cast<uint32_t>(plan.map);
+    return constants;
 }
 
 Result<std::array<VulkanBuffer, kFrameBindings>> upload_scene(VulkanDevice& device, const PackImage& image)

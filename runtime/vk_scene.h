@@ -1,10 +1,11 @@
-// A scene's arrays on a Vulkan device, and the facts to which the shader is specialised.
+// A scene's arrays on a Vulkan device, and the constants to which the shader is specialised.
 #pragma once
 
 #include "format/derive_kd.h"
 #include "format/result.h"
 #include "runtime/camera.h"
 #include "runtime/cpu_view.h"
+#include "runtime/effect_plan.h"
 #include "runtime/tracer.h"
 #include "runtime/vk_buffer.h"
 #include "runtime/vk_device.h"
@@ -16,14 +17,9 @@
 
 namespace trimray {
 
-/// What the pack holds, as far as the shader cares.
-struct SceneFacts {
-    uint32_t kinds = 0;              // bit kKind...
-    uint32_t features = 0;           // kFeatureTrims, kFeatureRational, kFeatureRims
-    uint32_t stack_size = 0;         // waiting children at most, top tree and deepest part together
-    uint32_t largest_net_floats = 0; // of a Bezier patch
-};
-SceneFacts scene_facts(const PackImage& image);
+/// The constants of primary.comp, by kSpec.... `count`: work counts are wanted.
+using Specialisation = std::array<uint32_t, kFrameSpecs>;
+Specialisation specialisation(const EffectPlan& plan, bool count);
 
 /// The pack's arrays by binding (shaders/frame_layout.h); the bindings of a frame's own buffers stay empty.
 /// Fails: DeviceFailed.

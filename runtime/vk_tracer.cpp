@@ -1,6 +1,7 @@
 // The Vulkan tracer: uploads a scene once, then traces each frame in bands of rows, one dispatch of primary.comp a
 // band, and reads the last frame's pixels back.
 #include "runtime/border_cells.h"
+#include "runtime/effect_plan.h"
 #include "runtime/frame_effects.h"
 #include "runtime/light_view.h"
 #include "runtime/section_view.h"
@@ -45,17 +46,11 @@ const uint32_t kCapsSpirv[] =
 // Bounds the memory of a band and the time of a dispatch, which some drivers end after a second or two
 constexpr size_t kBandBytes = size_t{32} << 20;
 
-// The software driver ends an invocation's loops in silence after 65,535 iterations. walk() looks at its count after
-// each round, which takes at most 20,000 (kRoundIterations in leaf_hit.glsl); shading takes another 3,400. Edges, where
-// they are wanted, take 12,000 (kEdgeIterations in border_edges.glsl) and a piece more, a map less than kMapIterations:
-// two evaluations of 26 x 26 points and 6 x 350 steps of their polynomials.
-constexpr uint32_t kSoftwareIterationLimit = 42000, kSoftwareIterationLimitWithEdges = 28000, kMapIterations = 6000;
+constexpr uint32_t kLookDone =
+    kLookLights | kLookShadows | kLookSoftShadows | kLookOcclusion | kLookMap | kLookSection | kLookCaps;
 
 // Pixels whose subgroup reached that limit are traced again, one by one, in dispatches of so many
 constexpr uint32_t kMostRetries = 4096;
-
-// Larger nets are read from the buffer on the software driver too: so many floats lie beside each invocation
-constexpr uint32_t kMostLocalFloats = 1024;
 
 // Rays a pixel that one dispatch of light.comp casts: on the software driver a ray takes what the loop limit allows
 constexpr uint32_t kSamplesADispatch = 16, kSoftwareSamplesADispatch = 1;
@@ -89,17 +84,19 @@ class VulkanTracer : public Tracer {
 public:
     VulkanTracer(std::shared_ptr<const Scene> scene, std::unique_ptr<VulkanDevice> device)
         : device_(std::move(device)), scene_(std::move(scene)), cpu_scene_(prepared(*scene_)),
-          facts_(scene_facts(scene_->pack.image))
+          facts_(pack_facts(scene_->pack.image))
     {
     }
 
     Status upload();
+    DeviceKind device_kind() const override
+    {
+        return device_->is_software() ? DeviceKind::SoftwareVulkan : DeviceKind::Vulkan;
+    }
     std::string device_name() const override { return device_->name(); }
     Result<Frame> render(const RenderOptions& options, RenderStats& stats) override;
 
 private:
-    using Specialisation = std::array<uint32_t, kFrameSpecs>;
-
     Status upload_trims(TrimMode trim);
     Result<ComputePipeline*> pipeline(std::span<const uint32_t> spirv, TrimMode trim, const RenderOptions& options,
                                       bool count);
@@ -136,7 +133,7 @@ private:
     std::unique_ptr<VulkanDevice> device_; // first: everything below must be gone before it
     std::shared_ptr<const Scene> scene_;
     std::shared_ptr<const CpuScene> cpu_scene_; // which side of shells the eye is on is found on the CPU
-    SceneFacts facts_;
+    PackFacts facts_;
     size_t kd_bytes_ = 0; // of the kd-trees on the device; 0: none yet
     std::array<VulkanBuffer, kFrameBindings> buffers_;
     VulkanBuffer readback_;        // of a band's pixels
@@ -233,25 +230,11 @@ Status VulkanTracer::upload_trims(TrimMode trim)
 Result<ComputePipeline*> VulkanTracer::pipeline(std::span<const uint32_t> spirv, TrimMode trim,
                                                 const RenderOptions& options, bool count)
 {
-    Specialisation constants{};
-    constants[kSpecTrimMode] = trim == TrimMode::Sdf      ? kTrimByTexture
-                               : trim == TrimMode::Hybrid ? kTrimByBoth
-                               : trim == TrimMode::Kd     ? kTrimByKd
-                                                          : kTrimByCells;
-    constants[kSpecKinds] = facts_.kinds;
-    const bool stochastic = options.closest == ClosestPolicy::Stochastic;
-    constants[kSpecFeatures] = facts_.features | (options.shade ? kFeatureShade : 0) | (count ? kFeatureCount : 0) |
-                               (edges_wanted_ ? kFeatureEdges : 0) | (stochastic ? kFeatureStochastic : 0) |
-                               (keeps_hits(options) ? kFeatureKept : 0) | (reuses_hits(options) ? kFeatureReuse : 0) |
-                               (is_lit(options) ? kFeatureLights : 0) | (is_cut(options) ? kFeatureCut : 0);
-    constants[kSpecStackSize] = facts_.stack_size;
-    if (spirv.data() == kPrimarySpirv && has_map(options))
-        constants[kSpecMap] = static_cast<uint32_t>(options.look.map.map);
-    if (device_->is_software()) {
-        constants[kSpecLocalFloats] = facts_.largest_net_floats <= kMostLocalFloats ? facts_.largest_net_floats : 0;
-        constants[kSpecIterationLimit] = (edges_wanted_ ? kSoftwareIterationLimitWithEdges : kSoftwareIterationLimit) -
-                                         (constants[kSpecMap] != kMapNone ? kMapIterations : 0);
-    }
+    RenderOptions traced = options;
+    traced.trim = trim;
+    if (spirv.data() != kPrimarySpirv)
+        traced.look.map.map = SurfaceMap::None;
+    const Specialisation constants = specialisation(effect_plan(facts_, traced, device_kind()), count);
     for (MadePipeline& made : pipelines_)
         if (made.spirv == spirv.data() && made.constants == constants)
             return &made.pipeline;
@@ -832,6 +815,8 @@ Result<Frame> VulkanTracer::render(const RenderOptions& options, RenderStats& st
         return trim.error();
     if (*trim == TrimMode::Reference)
         return Error{ErrorCode::UnsupportedPackFeature, "--trim reference", "is the CPU tracer's; use --device cpu"};
+    if (const Status done = check_look(options, kLookDone, "vulkan"); !done)
+        return done.error();
     if (const Status drawable = check_effects(options); !drawable)
         return drawable.error();
     if (const Status lights = check_lights(options.look); !lights)

@@ -127,6 +127,7 @@ public:
         tracer_ = std::move(*made); // the scene was traced already
     }
 
+    DeviceKind device_kind() const override { return DeviceKind::Cpu; }
     std::string device_name() const override { return "plain"; }
 
     Result<Frame> render(const RenderOptions& options, RenderStats& stats) override
