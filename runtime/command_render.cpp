@@ -350,7 +350,8 @@ void register_render(CLI::App& app, int& exit_code)
     command->add_flag("--json", a->json, "Print one JSON object: device, times, bytes, effects, work per ray");
     command->footer(
         "Camera: pinhole or parallel rays, pixel centres at +0.5, row 0 at the top. Without --eye the model is framed "
-        "whole from --view.\nEXR channels: R G B A Z N.X N.Y N.Z U V face certified.\n\nExamples:\n"
+        "whole from --view.\nEXR channels: R G B A Z N.X N.Y N.Z U V face certified, and map (curvatures in 1/mm^2 or "
+        "1/mm, draft in degrees).\n\nExamples:\n"
         "  trimray render model.tray -o picture.png\n"
         "  trimray render model.tray -o picture.png --view front --samples 3 --background white\n"
         "  trimray render model.tray -o hits.exr --size 1920x1080 --eye 100,-200,80 --target 0,0,10\n"

@@ -21,14 +21,15 @@ bool measures(SurfaceMap map);
 bool has_map(const RenderOptions& options);
 
 /// What the ends of a curvature's scale stand for where nobody says: +-kCurvatureRange over the diagonal of the pack's
-/// bounds, Gaussian curvature +- the square of it. A fillet whose radius is a kCurvatureRange-th of the model has full
+/// bounds, Gaussian curvature +- the square of it: a ball whose radius is a kCurvatureRange-th of the model has full
 /// colour.
 inline constexpr double kCurvatureRange = 10;
+
+inline constexpr uint32_t kMostStripes = 10000;
 
 /// Whether a map can be drawn on this pack. Fails: Usage, for a direction of no length, no stripes or more than
 /// kMostStripes, a range without width, a draft outside of [0, 90) degrees; UnsupportedPackFeature, for curvatures
 /// where a placement is not a turn, a mirroring and one scale: there the part's curvatures are not the world's.
-inline constexpr uint32_t kMostStripes = 10000;
 Status check_map(const PackImage& image, const SurfaceMapLook& look);
 
 /// Domain: check_map allows it, and the map is not none.
