@@ -104,6 +104,7 @@ public:
     HWY_ATTR HWY_NOINLINE PacketHit trace(const FreePacket& rays, bool any, Crossings* crossings = nullptr)
     {
         crossings_ = crossings;
+        any_ = any;
         leaf_hits_.rims_cut = crossings == nullptr;
         PacketHit hit;
         hit.best = select(rays.alive, rays.reach, real(-kHuge));
@@ -115,7 +116,7 @@ public:
         hit.doubt = real(kHuge);
         work_.free_rays += lane_count(rays.alive);
         recent_.clear();
-        const auto enter = [&](uint instance) HWY_ATTR { meet_instance(rays, any, instance, hit); };
+        const auto enter = [&](uint instance) HWY_ATTR { meet_instance(rays, instance, hit); };
         if (image_.instances.size() == 1)
             enter(0);
         else if (!image_.top_nodes.empty())
@@ -135,7 +136,7 @@ private:
         return {origin, real3(safe_inverse(direction.x), safe_inverse(direction.y), safe_inverse(direction.z))};
     }
 
-    HWY_ATTR void meet_instance(const FreePacket& rays, bool any, uint instance, PacketHit& hit)
+    HWY_ATTR void meet_instance(const FreePacket& rays, uint instance, PacketHit& hit)
     {
         const PartRecord& part = image_.parts[image_.instances[instance].part];
         if (part.node_count == 0)
@@ -148,7 +149,7 @@ private:
         const real3 direction = project(row_x, row_y, row_z, rays.direction);
         walk(image_.part_nodes.data() + part.first_node, tree_packet(origin, direction), hit, [&](uint leaf) HWY_ATTR {
             meet_leaf(rays, part.first_leaf + leaf, instance, origin, direction, to.scale * rays.footprint, hit);
-            if (any)
+            if (any_)
                 hit.best = select(hit.leaf != integer(~0u), real(-kHuge), hit.best);
         });
     }
@@ -159,6 +160,8 @@ private:
         constexpr float kBoxMargin = 1e-6f; // patch units: as for the eye's rays
         const LeafRecord& leaf = image_.leaves[leaf_id];
         const PatchRecord& patch = image_.patches[leaf.patch];
+        if (any_ && job_.materials && job_.materials->of(patch.face, instance).opacity < 1)
+            return; // light comes through
         const scalar3 x(patch.axis_x[0], patch.axis_x[1], patch.axis_x[2]);
         const scalar3 y(patch.axis_y[0], patch.axis_y[1], patch.axis_y[2]);
         const scalar3 z(patch.axis_z[0], patch.axis_z[1], patch.axis_z[2]);
@@ -232,6 +235,7 @@ private:
     const PackImage& image_;
     LeafHits<FreeRays> leaf_hits_;
     Crossings* crossings_ = nullptr;
+    bool any_ = false;
     RecentPatches recent_;
 };
 

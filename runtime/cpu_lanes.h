@@ -7,6 +7,7 @@
 #include "runtime/edge_lines.h"
 #include "runtime/frame_effects.h"
 #include "runtime/light_view.h"
+#include "runtime/materials.h"
 #include "runtime/section_view.h"
 #include "runtime/stochastic_frames.h"
 #include "runtime/tracer.h"
@@ -112,6 +113,8 @@ struct BlockJob {
     const StochasticJob* stochastic = nullptr; // null: ClosestPolicy::Certified
     const FrameLights* light = nullptr;        // null: the light at the eye alone
     const SectionView* section = nullptr;      // null: nothing is cut away
+    const MaterialTable* materials = nullptr;  // null: what the pack says
+    const Environment* environment = nullptr;  // null: nothing is behind the model
     const PlaceView* places = nullptr;         // where there is light or a section
     std::span<const WorldToPart> to_part = {}; // by instance, where rays begin elsewhere than at the eye
     const MapJob* map = nullptr;               // null: surfaces have their own colours

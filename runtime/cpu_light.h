@@ -26,12 +26,12 @@ public:
     HWY_ATTR HWY_NOINLINE real3 lit(const Packet& packet, const LitPoints& points)
     {
         const real past = select(points.alive, points.past, real(0.0f));
-        return lit_at(places_.at(packet, past), places_.footprint(past), points);
+        return lit_at(places_.at(packet, past), places_.footprint(past), points, view_.mirror_depth);
     }
 
 private:
-    /// place: the top tree's units; pixel: its width there.
-    HWY_ATTR real3 lit_at(real3 place, real pixel, const LitPoints& points)
+    /// place: the top tree's units; pixel: its width there; reflections: how many are followed.
+    HWY_ATTR HWY_NOINLINE real3 lit_at(real3 place, real pixel, const LitPoints& points, uint reflections)
     {
         const mask turned = dot(points.normal, points.to_eye) < 0.0f;
         const real3 normal = select(turned, -points.normal, points.normal);
@@ -42,7 +42,39 @@ private:
             points.color * (sky_light(points.normal, points.to_eye) * view_.sky * open_sky(points, normal, rays));
         for (const LightRecord& light : job_.light->lights)
             sum = sum + from_light(light, points, normal, rays);
-        return sum;
+        if (reflections == 0 || !any_lane(points.alive && points.mirror > 0.0f))
+            return sum;
+        rays.alive = points.alive && points.mirror > 0.0f;
+        rays.direction = normal * (2.0f * dot(normal, points.to_eye)) - points.to_eye;
+        const real3 reflected = seen_along(rays, pixel, reflections - 1);
+        return select(rays.alive, sum * (1.0f - points.mirror) + reflected * points.mirror, sum);
+    }
+
+    /// What rays that leave a mirror see. Surfaces are opaque there, and sections have no caps.
+    HWY_ATTR real3 seen_along(FreePacket& rays, real pixel, uint reflections)
+    {
+        rays.reach = real(kHuge);
+        const PacketHit hit = rays_.closest(rays);
+        const mask hits = rays.alive && hit.leaf != integer(~0u);
+        real3 seen(vector(view_.background));
+        if (job_.environment && any_lane(rays.alive && !hits))
+            seen = environment_along(*job_.environment, rays.direction);
+        if (!any_lane(hits))
+            return seen;
+        const PacketShading shading = shade_leaves(job_, hit, lane_bits(hits));
+        const real size = length(shading.normal);
+        const mask has_normal = size > 0.0f && hits;
+        LitPoints points;
+        points.past = real(0.0f);
+        points.to_eye = -rays.direction;
+        points.normal =
+            select(has_normal, shading.normal * (1.0f / select(has_normal, size, real(1.0f))), points.to_eye);
+        points.color = shading.color;
+        points.specular = shading.specular;
+        points.mirror = shading.mirror;
+        points.alive = hits;
+        const real3 place = rays.origin + rays.direction * select(hits, hit.best, real(0.0f));
+        return select(hits, lit_at(place, pixel, points, reflections), seen);
     }
 
     static scalar3 vector(const float (&v)[3]) { return scalar3(v[0], v[1], v[2]); }

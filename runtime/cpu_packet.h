@@ -26,8 +26,8 @@
 
 SHARED_OPEN
 
-/// kCut: section planes leave a part of each ray.
-template <bool kCut>
+/// kSpans: rays may begin on their way, at section planes or behind surfaces that let light through.
+template <bool kSpans>
 class BlockTracer {
 public:
     HWY_ATTR BlockTracer(const BlockJob& job, BlockScratch& scratch, Frame& frame, WorkCounts& work)
@@ -37,9 +37,10 @@ public:
     {
         if (job.light)
             light_.emplace(job, scratch, source_, work);
-        span_.begin = real(-float(job.view.tau_ref));
-        if constexpr (kCut)
-            caps_.emplace(job, scratch, source_, work);
+        span_ = {real(-float(job.view.tau_ref)), real(kHuge), integer(kNoPlane)};
+        if constexpr (kSpans)
+            if (job.section)
+                caps_.emplace(job, scratch, source_, work);
     }
 
     HWY_ATTR void trace(const Block& block)
@@ -72,13 +73,15 @@ public:
                         packet.x = load(offset_x) + real(float(x));
                         packet.y = load(offset_y) + real(float(y));
                         packet.alive = packet.x < float(tile.x1) - middle_x && packet.y < float(tile.y1) - middle_y;
-                        if constexpr (kCut)
-                            span_ = caps_->span(packet);
+                        if constexpr (kSpans)
+                            if (caps_)
+                                span_ = caps_->span(packet);
                         kept_ = keeps ? &job_.stochastic->kept->of_packet(x, y) : nullptr;
-                        PacketHit hit = trace_twice(packet, pixel_rect({x, y, x + 4, y + 4}));
+                        const PixelRect rect = pixel_rect({x, y, x + 4, y + 4});
+                        PacketHit hit = trace_twice(packet, rect);
                         if (keeps)
                             keep_nearer(hit, packet.alive, *kept_);
-                        write(packet, hit, x - block.x0, y - strip_y0);
+                        write(packet, rect, hit, x - block.x0, y - strip_y0);
                         if (has_borders)
                             edges_.find(packet, hit, x, y, &scratch_.strip.rgba[y - strip_y0][4 * (x - block.x0)]);
                     }
@@ -129,16 +132,75 @@ private:
     }
 
     /// Puts the packet's pixels at (x, y) of the strip. A cap hides the hit behind it.
-    HWY_ATTR void write(const Packet& packet, PacketHit& hit, uint32_t x, uint32_t y)
+    HWY_ATTR void write(const Packet& packet, const PixelRect& rect, PacketHit& hit, uint32_t x, uint32_t y)
     {
         PacketLight* const light = light_ ? &*light_ : nullptr;
-        if constexpr (!kCut) {
-            write_packet(job_, packet, hit, nullptr, light, x, y, scratch_.strip, work_);
-        } else {
-            const PacketCaps caps = caps_->find(packet, span_, hit);
-            write_packet(job_, packet, hit, &caps, light, x, y, scratch_.strip, work_);
-            hit.best = select(caps.here, real(kHuge), hit.best);
+        PacketCaps caps;
+        if constexpr (kSpans)
+            if (caps_)
+                caps = caps_->find(packet, span_, hit);
+        if (put_misses(job_, packet, hit, x, y, scratch_.strip, work_))
+            return;
+        SeenPacket seen =
+            see_packet(job_, packet, hit, kSpans && caps_ ? &caps : nullptr, light, x, y, &scratch_.strip);
+        real alpha = select(seen.hits, real(1.0f), real(0.0f));
+        if constexpr (kSpans)
+            if (job_.materials && job_.materials->transparent)
+                alpha = see_through(packet, rect, hit, seen);
+        if (job_.environment)
+            alpha = see_environment(packet, alpha, seen);
+        put_packet(seen, alpha, packet.alive, x, y, scratch_.strip, work_);
+        if constexpr (kSpans)
+            if (caps_)
+                hit.best = select(caps.here, real(kHuge), hit.best);
+    }
+
+    /// Blends what lies behind surfaces that let light through into seen.color; returns the pixels' alpha. Each layer
+    /// is traced from behind the one before it, so layers come in their order along the ray.
+    HWY_ATTR HWY_NOINLINE real see_through(const Packet& packet, const PixelRect& rect, const PacketHit& first,
+                                           SeenPacket& seen)
+    {
+        constexpr float kLeast = 1.0f / 1024; // what shines through less is not followed
+        constexpr int kMostLayers = 256;
+        const PixelPlaces places(*job_.places);
+        const real speed = length(places.along(packet));
+        real left = select(seen.hits, 1.0f - seen.opacity, real(0.0f));
+        real3 sum = seen.color * (1.0f - left);
+        KeptPacket* const kept = kept_;
+        kept_ = nullptr;
+        const CutSpan whole = span_;
+        PacketHit hit = first;
+        mask on = seen.hits && left > kLeast;
+        for (int layer = 1; layer < kMostLayers && any_lane(on); ++layer) {
+            const real past = select(on, hit.best, real(0.0f));
+            const real away = start_distance(places.at(packet, past), places.footprint(past) * job_.error_px);
+            span_.begin = select(on, past + away / speed, real(kHuge));
+            const Packet rays{packet.x, packet.y, on};
+            hit = trace_twice(rays, rect);
+            const SeenPacket behind = see_packet(job_, rays, hit, nullptr, light_ ? &*light_ : nullptr, 0, 0, nullptr);
+            on = on && behind.hits;
+            const real share = select(on, left * behind.opacity, real(0.0f));
+            sum = sum + select(on, behind.color, real3(real(0.0f), real(0.0f), real(0.0f))) * share;
+            left = left - share;
+            on = on && left > kLeast;
         }
+        span_ = whole;
+        kept_ = kept;
+        const real alpha = select(seen.hits, 1.0f - left, real(0.0f));
+        seen.color = sum * (1.0f / select(alpha > 0.0f, alpha, real(1.0f)));
+        return alpha;
+    }
+
+    /// Blends the environment behind what is seen; nothing shows through then.
+    HWY_ATTR HWY_NOINLINE real see_environment(const Packet& packet, real alpha, SeenPacket& seen) const
+    {
+        const View& view = job_.view;
+        const auto vector = [](const double(&v)[3]) { return scalar3(float(v[0]), float(v[1]), float(v[2])); };
+        const real3 along = vector(view.w0) + packet.x * vector(view.step_x) + packet.y * vector(view.step_y);
+        const real3 behind = environment_along(*job_.environment, along);
+        seen.color = select(alpha > 0.0f, seen.color * alpha, real3(real(0.0f), real(0.0f), real(0.0f))) +
+                     behind * (1.0f - alpha);
+        return real(1.0f);
     }
 
     /// A rim's back counts as a surface first, for few rays meet one: where it is what they see they are traced again.
@@ -163,7 +225,7 @@ private:
         hit.back = mask(false);
         hit.doubt = real(job_.stochastic ? -kHuge : kHuge); // plain Newton claims nothing
         float farthest = kHuge;
-        if constexpr (kCut) {
+        if constexpr (kSpans) {
             hit.best = select(packet.alive && span_.begin < span_.end, min(span_.end, hit.best), real(-kHuge));
             farthest = largest_lane(hit.best);
         }
@@ -185,7 +247,7 @@ private:
                     farthest = largest_lane(hit.best);
             }
         }
-        if constexpr (kCut)
+        if constexpr (kSpans)
             hit.best = select(hit.leaf == integer(~0u), real(kHuge), hit.best);
         return hit;
     }
@@ -225,7 +287,7 @@ private:
     EdgeFinder edges_;
     std::optional<PacketLight> light_;
     std::optional<CapFinder> caps_;
-    CutSpan span_; // of the packet at hand where kCut; else it begins at the eye
+    CutSpan span_; // of the packet at hand where kSpans; else it begins at the eye
     size_t tile_count_ = 0;
     RecentPatches recent_;
     KeptPacket* kept_ = nullptr; // of the packet at hand, where hits are kept from frame to frame

@@ -4,6 +4,7 @@
 #include "runtime/frame_effects.h"
 #include "runtime/frame_size.h"
 #include "runtime/light_view.h"
+#include "runtime/materials.h"
 #include "runtime/section_view.h"
 #include "runtime/surface_map.h"
 #include "runtime/thread_clock.h"
@@ -28,8 +29,9 @@
 namespace trimray {
 namespace {
 
-constexpr uint32_t kLookDone =
-    kLookLights | kLookShadows | kLookSoftShadows | kLookOcclusion | kLookMap | kLookSection | kLookCaps;
+constexpr uint32_t kLookDone = kLookLights | kLookShadows | kLookSoftShadows | kLookOcclusion | kLookMap |
+                               kLookSection | kLookCaps | kLookMaterials | kLookTransparency | kLookMirrors |
+                               kLookEnvironment;
 
 class CpuTracer final : public Tracer {
 public:
@@ -60,6 +62,9 @@ public:
             return lights.error();
         if (const Status section = check_section(options.look.section); !section.ok())
             return section.error();
+        const Result<MaterialTable> materials = resolve_materials(scene_->pack.image, options.look);
+        if (!materials.ok())
+            return materials.error();
         const bool asks_free_rays =
             (options.shade && has_light_rays(options.look)) || !options.look.section.planes.empty();
         if (asks_free_rays && to_part_.empty())
@@ -88,7 +93,7 @@ public:
         for (uint32_t i = 0; i < std::max(options.frames, 1u); ++i) {
             const auto start = std::chrono::steady_clock::now();
             const double cpu_start = thread_cpu_seconds();
-            const WorkCounts work = render_once(options, stats.trim, i, threads, arena, frame);
+            const WorkCounts work = render_once(options, *materials, stats.trim, i, threads, arena, frame);
             if (i == 0)
                 stats.work = work;
             const std::chrono::duration<double, std::milli> spent = std::chrono::steady_clock::now() - start;
@@ -101,8 +106,8 @@ public:
     }
 
 private:
-    WorkCounts render_once(const RenderOptions& options, TrimMode trim, uint32_t frame_number, int threads,
-                           tbb::task_arena& arena, Frame& frame)
+    WorkCounts render_once(const RenderOptions& options, const MaterialTable& materials, TrimMode trim,
+                           uint32_t frame_number, int threads, tbb::task_arena& arena, Frame& frame)
     {
         const CameraRays rays = camera_rays(options.camera, options.width, options.height);
         View view = make_view(cpu_scene_->image, rays, options.width, options.height);
@@ -126,7 +131,11 @@ private:
         const PlaceView places = place_view(image, picture);
         const FrameLights lights = is_lit ? frame_lights(image, options) : FrameLights{};
         const SectionView section = is_cut ? section_view(image, options.look.section, picture) : SectionView{};
-        if (is_lit || is_cut)
+        if (options.shade && has_materials(options.look))
+            job.materials = &materials;
+        if (options.shade)
+            job.environment = options.look.environment.get();
+        if (is_lit || is_cut || (job.materials && materials.transparent))
             job.places = &places;
         if (is_lit)
             job.light = &lights;

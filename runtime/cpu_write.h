@@ -10,6 +10,7 @@
 #include "format/pack_layout.h"
 #include "runtime/cpu_lanes.h"
 #include "runtime/cpu_maps.h"
+#include "shaders/shared/environment.h"
 #include "shaders/shared/language.h"
 #include "shaders/shared/leaf_box.h"
 #include "shaders/shared/shading.h"
@@ -64,6 +65,9 @@ private:
 /// A face's colour, linear light.
 static inline const float* color_of(const BlockJob& job, uint face, uint instance)
 {
+    if (job.materials)
+        if (const MaterialRecord& material = job.materials->of(face, instance); material.has_color > 0)
+            return material.color;
     const bool own = (job.scene.image.faces[face].flags & kFaceHasColor) != 0;
     return own ? job.scene.face_color[face].data() : job.scene.instance_color[instance].data();
 }
@@ -74,6 +78,7 @@ struct PacketShading {
     real3 color;  // linear
     real2 uv_file;
     integer face;
+    real specular, mirror, opacity; // where the job has materials
 };
 
 /// One leaf at a time, in all the lanes that hit it.
@@ -89,6 +94,11 @@ struct PacketShading {
     out.color = out.normal;
     out.uv_file = real2(real(0.0f), real(0.0f));
     out.face = integer(~0u);
+    if (job.materials) { // caps are plain
+        out.specular = real(kSpecular);
+        out.mirror = real(0.0f);
+        out.opacity = real(1.0f);
+    }
     for (uint left = hit_lanes; left != 0;) {
         const int lane = __builtin_ctz(left);
         const uint leaf_id = leaves[lane], instance_id = instances[lane];
@@ -111,6 +121,12 @@ struct PacketShading {
         out.uv_file =
             select(here, real2(lo[0] + size[0] * hit.uv_face.x, lo[1] + size[1] * hit.uv_face.y), out.uv_file);
         out.face = select(here, integer(patch.face), out.face);
+        if (job.materials) {
+            const MaterialRecord& material = job.materials->of(patch.face, instance_id);
+            out.specular = select(here, real(material.specular), out.specular);
+            out.mirror = select(here, real(material.mirror), out.mirror);
+            out.opacity = select(here, real(material.opacity), out.opacity);
+        }
     }
     return out;
 }
@@ -152,7 +168,20 @@ struct LitPoints {
     real3 to_eye; // unit
     real3 color;
     real specular;
+    real mirror;
     mask alive;
+};
+
+/// What a packet's pixels show.
+struct SeenPacket {
+    mask hits;
+    real depth; // along the ray, mm
+    real3 normal;
+    real2 uv;
+    integer face, instance;
+    real3 color;
+    real opacity; // of what was hit
+    mask certified;
 };
 
 constexpr PacketPixels missed_pixels(bool certified)
@@ -234,23 +263,30 @@ HWY_INLINE void copy_to_strip(const PacketPixels& pixels, uint32_t x, uint32_t y
         write_strip_values(strip, x, y, columns, rows, frame);
 }
 
-/// Light: PacketLight (runtime/cpu_light.h); null where there is the light at the eye alone. Caps are hits without a
-/// leaf; null where there are no section planes.
-template <class Light>
-HWY_ATTR void write_packet(const BlockJob& job, const Packet& packet, const PacketHit& hit, const PacketCaps* caps,
-                           Light* light, uint32_t x, uint32_t y, Strip& strip, WorkCounts& work)
+/// What the environment shows along the rays; `along` any length.
+[[maybe_unused]] static HWY_ATTR HWY_NOINLINE real3 environment_along(const Environment& environment, real3 along)
 {
-    const mask hits = packet.alive && hit.best < kHuge;
-    const uint hit_lanes = lane_bits(hits);
-    if (hit_lanes == 0 && job.stochastic) {
-        copy_to_strip(kDoubtfulMisses, x, y, strip);
-        work.uncertified_pixels += uint64_t(__builtin_popcount(lane_bits(packet.alive)));
-        return;
-    }
-    if (hit_lanes == 0 && !any_lane(packet.alive && hit.doubt < kHuge)) {
-        copy_to_strip(kMissedPixels, x, y, strip);
-        return;
-    }
+    const EnvironmentTexels at = environment_texels(along, environment.width, environment.height);
+    const auto channel = [&](uint c) HWY_ATTR {
+        const float* rgb = environment.rgb.data() + c;
+        const auto texel = [&](integer index) HWY_ATTR { return gather(rgb, index * integer(3u)); };
+        const real above = texel(at.a) + (texel(at.b) - texel(at.a)) * at.across;
+        const real below = texel(at.c) + (texel(at.d) - texel(at.c)) * at.across;
+        return above + (below - above) * at.down;
+    };
+    return real3(channel(0), channel(1), channel(2));
+}
+
+/// The pixels of hits. Light: PacketLight (runtime/cpu_light.h); null where there is the light at the eye alone. Caps
+/// are hits without a leaf; null where there are none. Values of maps that measure go to (x, y) of the strip, if there
+/// is one.
+template <class Light>
+HWY_ATTR HWY_INLINE SeenPacket see_packet(const BlockJob& job, const Packet& packet, const PacketHit& hit,
+                                          const PacketCaps* caps, Light* light, uint32_t x, uint32_t y, Strip* strip)
+{
+    SeenPacket seen;
+    seen.hits = packet.alive && hit.best < kHuge;
+    const uint hit_lanes = lane_bits(seen.hits);
     const uint surface_lanes = caps ? hit_lanes & ~lane_bits(caps->here) : hit_lanes;
     PacketShading shading = shade_leaves(job, hit, surface_lanes);
     if (caps)
@@ -261,49 +297,82 @@ HWY_ATTR void write_packet(const BlockJob& job, const Packet& packet, const Pack
     const scalar3 step_y(float(view.step_y[0]), float(view.step_y[1]), float(view.step_y[2]));
     const real3 along = w0 + packet.x * step_x + packet.y * step_y;
     const real speed = length(along);
-    const real depth =
-        select(hits, (float(view.tau_ref) + hit.best) * speed, real(std::numeric_limits<float>::infinity()));
+    seen.depth =
+        select(seen.hits, (float(view.tau_ref) + hit.best) * speed, real(std::numeric_limits<float>::infinity()));
     const real size = length(shading.normal);
-    const mask has_normal = size > 0.0f && hits;
-    real3 normal = shading.normal * (1.0f / select(has_normal, size, real(1.0f)));
+    const mask has_normal = size > 0.0f && seen.hits;
     // a surface without a normal faces the eye
     const real3 to_eye = along * (-1.0f / speed);
-    normal = select(has_normal, normal, to_eye);
+    seen.normal = select(has_normal, shading.normal * (1.0f / select(has_normal, size, real(1.0f))), to_eye);
     real3 surface = shading.color;
     mask glows(false); // pixels whose map is seen as it is
     if (job.map != nullptr) {
-        const MapHits on_map{packet.x, packet.y, hit.best, hit.leaf, hit.instance, hit.uv_face, normal, to_eye};
+        const MapHits on_map{packet.x, packet.y, hit.best, hit.leaf, hit.instance, hit.uv_face, seen.normal, to_eye};
         const MapColor map = map_hits(job, on_map, surface_lanes);
         const mask mapped = lanes_of(surface_lanes);
         surface = select(mapped, map.color, surface);
         if (!is_lit_map(job.map->map))
             glows = mapped;
-        if (job.map->measures)
-            write_values(select(mapped, map.value, real(0.0f)), x, y, strip);
+        if (strip && job.map->measures)
+            write_values(select(mapped, map.value, real(0.0f)), x, y, *strip);
     }
-    real3 color = surface;
-    if (any_lane(hits && !glows)) {
-        color = light ? light->lit(packet, {hit.best, normal, to_eye, surface, real(kSpecular), hits && !glows})
-                      : shade(surface, normal, to_eye);
-        color = select(glows, surface, color);
+    seen.color = surface;
+    if (any_lane(seen.hits && !glows)) {
+        const real specular = job.materials ? shading.specular : real(kSpecular);
+        const real mirror = job.materials ? shading.mirror : real(0.0f);
+        seen.color =
+            light ? light->lit(packet, {hit.best, seen.normal, to_eye, surface, specular, mirror, seen.hits && !glows})
+                  : shade(surface, seen.normal, to_eye);
+        seen.color = select(glows, surface, seen.color);
     }
-    const mask certified = hit.doubt >= kHuge || hit.doubt > hit.best;
+    if (!job.shade)
+        seen.color = real3(real(0.0f), real(0.0f), real(0.0f));
+    seen.opacity = job.materials ? shading.opacity : real(1.0f);
+    seen.uv = shading.uv_file;
+    seen.face = shading.face;
+    seen.instance = hit.instance;
+    seen.certified = hit.doubt >= kHuge || hit.doubt > hit.best;
+    return seen;
+}
 
+/// `alpha`: of the pixels, whose colours are straight.
+[[maybe_unused]] static HWY_ATTR HWY_INLINE void put_packet(const SeenPacket& seen, real alpha, mask alive, uint32_t x,
+                                                            uint32_t y, Strip& strip, WorkCounts& work)
+{
+    const mask hits = seen.hits, shown = alpha > 0.0f;
     const real none = real(0.0f);
-    const real3 shown = select(hits, job.shade ? color : real3(none, none, none), real3(none, none, none));
     PacketPixels pixels;
-    store_interleaved(shown.x, shown.y, shown.z, select(hits, real(1.0f), none), pixels.rgba);
-    store_interleaved(select(hits, normal.x, none), select(hits, normal.y, none), select(hits, normal.z, none),
-                      pixels.normal);
-    store_interleaved(select(hits, shading.uv_file.x, none), select(hits, shading.uv_file.y, none), pixels.uv);
-    store(depth, pixels.depth);
-    store(select(hits, shading.face, integer(~0u)), pixels.face);
-    store(select(hits, hit.instance, integer(~0u)), pixels.instance);
-    const uint certified_lanes = lane_bits(certified), alive_lanes = lane_bits(packet.alive);
+    store_interleaved(select(shown, seen.color.x, none), select(shown, seen.color.y, none),
+                      select(shown, seen.color.z, none), alpha, pixels.rgba);
+    store_interleaved(select(hits, seen.normal.x, none), select(hits, seen.normal.y, none),
+                      select(hits, seen.normal.z, none), pixels.normal);
+    store_interleaved(select(hits, seen.uv.x, none), select(hits, seen.uv.y, none), pixels.uv);
+    store(seen.depth, pixels.depth);
+    store(select(hits, seen.face, integer(~0u)), pixels.face);
+    store(select(hits, seen.instance, integer(~0u)), pixels.instance);
+    const uint certified_lanes = lane_bits(seen.certified), alive_lanes = lane_bits(alive);
     work.uncertified_pixels += uint64_t(__builtin_popcount(alive_lanes & ~certified_lanes));
     for (uint lane = 0; lane < kLanes; ++lane)
         pixels.certified[lane] = certified_lanes >> lane & 1u;
     copy_to_strip(pixels, x, y, strip);
+}
+
+/// Whether no pixel of the packet needs more than what all misses show; then it is put there.
+[[maybe_unused]] static HWY_ATTR HWY_INLINE bool put_misses(const BlockJob& job, const Packet& packet,
+                                                            const PacketHit& hit, uint32_t x, uint32_t y, Strip& strip,
+                                                            WorkCounts& work)
+{
+    if (any_lane(packet.alive && hit.best < kHuge) || job.environment)
+        return false;
+    if (job.stochastic) {
+        copy_to_strip(kDoubtfulMisses, x, y, strip);
+        work.uncertified_pixels += uint64_t(__builtin_popcount(lane_bits(packet.alive)));
+        return true;
+    }
+    if (any_lane(packet.alive && hit.doubt < kHuge))
+        return false;
+    copy_to_strip(kMissedPixels, x, y, strip);
+    return true;
 }
 
 SHARED_CLOSE

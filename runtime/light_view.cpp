@@ -96,10 +96,6 @@ Status check_light(const Light& light, size_t number)
     return Done{};
 }
 
-} // namespace
-
-namespace {
-
 /// Bands that a map mirrors in surfaces are seen whatever the lights are.
 bool shows_light(const SceneLook& look)
 {
@@ -108,16 +104,22 @@ bool shows_light(const SceneLook& look)
 
 } // namespace
 
+bool has_mirrors(const SceneLook& look)
+{
+    return std::any_of(look.materials.begin(), look.materials.end(),
+                       [](const MaterialRule& rule) { return rule.material.mirror.value_or(0) > 0; });
+}
+
 bool has_lights(const SceneLook& look)
 {
-    return shows_light(look) && (!look.lights.empty() || look.occlusion.samples > 0 || look.sky);
+    return shows_light(look) && (!look.lights.empty() || look.occlusion.samples > 0 || look.sky || has_mirrors(look));
 }
 
 bool has_light_rays(const SceneLook& look)
 {
     const auto throws_shadows = [](const Light& light) { return light.shadows; };
-    return shows_light(look) &&
-           (look.occlusion.samples > 0 || std::any_of(look.lights.begin(), look.lights.end(), throws_shadows));
+    return shows_light(look) && (look.occlusion.samples > 0 || has_mirrors(look) ||
+                                 std::any_of(look.lights.begin(), look.lights.end(), throws_shadows));
 }
 
 Status check_lights(const SceneLook& look)

@@ -24,6 +24,9 @@ struct FrameLights {
     std::vector<float> samples;
 };
 
+/// Whether a rule makes a mirror.
+bool has_mirrors(const SceneLook& look);
+
 /// Whether a picture is lit by more than the light at the eye: then tracers need FrameLights.
 bool has_lights(const SceneLook& look);
 

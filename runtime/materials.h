@@ -45,6 +45,12 @@ struct MaterialTable {
 // Of a table: beyond it, rules tell more faces and placements apart than is sensible
 constexpr size_t kMostMaterialClasses = size_t{1} << 18;
 
+/// Whether a scene says anything of materials; otherwise its table says nothing that the pack does not.
+inline bool has_materials(const SceneLook& look)
+{
+    return !look.materials.empty() || look.xray;
+}
+
 /// Source: docs of MaterialRule: a rule holds where all its conditions do; later rules win, field by field; x-ray is
 /// the opacity where no rule gives one. A pack colour is a face's own, else its placement's, else the default grey.
 /// Fails: InvalidScene (more than kMostMaterialClasses pairs of classes).
