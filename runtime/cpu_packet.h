@@ -37,7 +37,7 @@ public:
     {
         if (job.light)
             light_.emplace(job, scratch, source_, work);
-        span_.begin = real(-float(job.view.tau_ref));
+        span_.begin = real(-float(job.view.depth_ref));
         if constexpr (kCut)
             caps_.emplace(job, scratch, source_, work);
     }

@@ -28,8 +28,8 @@
 namespace trimray {
 namespace {
 
-constexpr uint32_t kLookDone =
-    kLookLights | kLookShadows | kLookSoftShadows | kLookOcclusion | kLookMap | kLookSection | kLookCaps;
+constexpr uint32_t kLookDone = kLookLights | kLookShadows | kLookSoftShadows | kLookOcclusion | kLookMap |
+                               kLookSection | kLookCaps | kLookOrthographic;
 
 class CpuTracer final : public Tracer {
 public:
@@ -106,7 +106,7 @@ private:
     {
         const CameraRays rays = camera_rays(options.camera, options.width, options.height);
         View view = make_view(cpu_scene_->image, rays, options.width, options.height);
-        const std::vector<uint8_t> outside = seen_from_outside(*cpu_scene_, rays.eye);
+        const std::vector<uint8_t> outside = seen_from_outside(*cpu_scene_, options.camera.eye);
         for (size_t i = 0; i < outside.size(); ++i)
             view.instances[i].outside = outside[i] != 0 && options.look.section.planes.empty(); // it shows the inside
         BlockJob job{*cpu_scene_, view, options.width, options.height, trim, options.shade, options.error_px};

@@ -262,7 +262,7 @@ HWY_ATTR void write_packet(const BlockJob& job, const Packet& packet, const Pack
     const real3 along = w0 + packet.x * step_x + packet.y * step_y;
     const real speed = length(along);
     const real depth =
-        select(hits, (float(view.tau_ref) + hit.best) * speed, real(std::numeric_limits<float>::infinity()));
+        select(hits, (float(view.depth_ref) + hit.best) * speed, real(std::numeric_limits<float>::infinity()));
     const real size = length(shading.normal);
     const mask has_normal = size > 0.0f && hits;
     real3 normal = shading.normal * (1.0f / select(has_normal, size, real(1.0f)));
