@@ -28,7 +28,7 @@ public:
     /// What the planes leave of the pixels' rays.
     HWY_ATTR CutSpan span(const Packet& packet) const
     {
-        CutSpan span{real(-float(job_.view.tau_ref)), real(kHuge), integer(kNoPlane)};
+        CutSpan span{real(-float(job_.view.depth_ref)), real(kHuge), integer(kNoPlane)};
         for (uint i = 0; i < section_.count; ++i) {
             const SectionPlaneView& plane = section_.planes[i];
             span = cut_by(span, plane.at + packet.x * plane.at_x + packet.y * plane.at_y,

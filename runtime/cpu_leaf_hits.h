@@ -60,7 +60,8 @@ struct EyeRays {
     static constexpr bool kCollects = false;
     const PatchView& view;
     const mask& alive;
-    const real& begin; // `at` of the eye, or of the section plane where the rays begin
+    // `at` of the eye, or of its plane where they are parallel, or of the section plane where they begin
+    const real& begin;
 
     float base() const { return view.base_mm; } // `at` of t is base + per_t t
     float per_t() const { return view.mm_per_t; }

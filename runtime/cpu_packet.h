@@ -37,7 +37,7 @@ public:
     {
         if (job.light)
             light_.emplace(job, scratch, source_, work);
-        span_ = {real(-float(job.view.tau_ref)), real(kHuge), integer(kNoPlane)};
+        span_ = {real(-float(job.view.depth_ref)), real(kHuge), integer(kNoPlane)};
         if constexpr (kSpans)
             if (job.section)
                 caps_.emplace(job, scratch, source_, work);

@@ -31,7 +31,7 @@ namespace {
 
 constexpr uint32_t kLookDone = kLookLights | kLookShadows | kLookSoftShadows | kLookOcclusion | kLookMap |
                                kLookSection | kLookCaps | kLookMaterials | kLookTransparency | kLookMirrors |
-                               kLookEnvironment;
+                               kLookEnvironment | kLookOrthographic;
 
 class CpuTracer final : public Tracer {
 public:
@@ -111,7 +111,7 @@ private:
     {
         const CameraRays rays = camera_rays(options.camera, options.width, options.height);
         View view = make_view(cpu_scene_->image, rays, options.width, options.height);
-        const std::vector<uint8_t> outside = seen_from_outside(*cpu_scene_, rays.eye);
+        const std::vector<uint8_t> outside = seen_from_outside(*cpu_scene_, options.camera.eye);
         for (size_t i = 0; i < outside.size(); ++i)
             view.instances[i].outside = outside[i] != 0 && options.look.section.planes.empty(); // it shows the inside
         BlockJob job{*cpu_scene_, view, options.width, options.height, trim, options.shade, options.error_px};

@@ -62,6 +62,8 @@ InstanceView view_from(const InstanceRecord& instance, const PartRecord& part, c
         w0[i] = dot(inverse[i], view.w0);
     }
     out.k = std::sqrt(dot(w0, w0));
+    constexpr double kFarRounding = 1e-15; // a few roundings of numbers as large as the distance
+    out.far_slack = kFarRounding * view.plane_mm * out.k;
     for (int i = 0; i < 3; ++i) {
         out.w0[i] = w0[i] / out.k;
         out.step_x[i] = dot(inverse[i], view.step_x) / out.k;
@@ -80,10 +82,10 @@ InstanceView view_from(const InstanceRecord& instance, const PartRecord& part, c
     return out;
 }
 
-/// Fills what follows from eye, w0 and steps.
+/// Fills what follows from eye, w0, steps and plane.
 void finish_view(const PackImage& image, View& view)
 {
-    // tau of the model's nearest corner, or of the eye where that is behind it
+    // tau of the model's nearest corner, or of the eye or its plane where that is behind it
     double nearest = std::numeric_limits<double>::infinity();
     for (int corner = 0; corner < 8; ++corner) {
         double p[3];
@@ -91,7 +93,9 @@ void finish_view(const PackImage& image, View& view)
             p[i] = (corner >> i & 1 ? image.bounds_hi_mm[i] : image.bounds_lo_mm[i]) - view.eye_mm[i];
         nearest = std::min(nearest, dot(p, view.w0));
     }
-    view.tau_ref = nearest > 0 && nearest < 1e30 ? double(float(nearest)) : 0;
+    nearest -= view.plane_mm;
+    view.depth_ref = nearest > 0 && nearest < 1e30 ? double(float(nearest)) : 0;
+    view.tau_ref = view.plane_mm + view.depth_ref;
     view.instances.reserve(image.instances.size());
     for (const InstanceRecord& instance : image.instances)
         view.instances.push_back(view_from(instance, image.parts[instance.part], view));
@@ -191,7 +195,7 @@ CpuScene::PartBox part_box(const PackImage& image, const PartRecord& part)
 }
 
 /// Where a leaf's box appears on the picture; false: not within the rectangle.
-bool project_box(const CpuScene::LeafBounds& box, const InstanceView& view, const PixelRect& rect, double tau_ref,
+bool project_box(const CpuScene::LeafBounds& box, const InstanceView& view, const PixelRect& rect, const View& picture,
                  Candidate& out)
 {
     const double c[3] = {box.center[0] - view.eye[0], box.center[1] - view.eye[1], box.center[2] - view.eye[2]};
@@ -205,10 +209,11 @@ bool project_box(const CpuScene::LeafBounds& box, const InstanceView& view, cons
         reach += std::abs(tau_a[i]);
     }
     // the centre is rounded to 2^-24 of the part
-    reach = reach * (1 + 1e-7) + 1e-7;
+    reach = reach * (1 + 1e-7) + 1e-7 + view.far_slack;
     if (tau + reach <= 0)
         return false;
-    out.near_mm = float((std::max(tau - reach, 0.0) / view.k - tau_ref) - 1e-7 * (tau / view.k));
+    out.near_mm =
+        float((std::max(tau - reach, 0.0) / view.k - picture.tau_ref) - 1e-7 * (tau / view.k - picture.plane_mm));
     out.rect = rect;
     // a box around the eye's plane may be anywhere; one well before it is the hull of its corners
     if (!(tau - reach > 1e-3 * reach))
@@ -293,6 +298,7 @@ const Result<KdTrims>& CpuScene::kd_trims() const
 View make_view(const PackImage& image, const CameraRays& rays, uint32_t width, uint32_t height)
 {
     View view;
+    view.plane_mm = rays.plane_mm;
     double w0[3];
     for (size_t i = 0; i < 3; ++i) {
         view.eye_mm[i] = rays.eye[i];
@@ -351,7 +357,7 @@ void collect_candidates(const CpuScene& scene, const View& view, const PixelRect
             Candidate candidate;
             candidate.leaf = part.first_leaf + leaf;
             candidate.instance = index;
-            if (project_box(scene.leaf_bounds[candidate.leaf], instance, rect, view.tau_ref, candidate))
+            if (project_box(scene.leaf_bounds[candidate.leaf], instance, rect, view, candidate))
                 out.push_back(candidate);
         });
     };
@@ -398,7 +404,8 @@ PatchView make_patch_view(const PatchRecord& patch, const InstanceView& instance
     out.base_mm = float(tau / instance.k - tau_ref);
     out.mm_per_t = float(patch.scale / instance.k);
     // the patch's own arithmetic, |q| about 1, and one rounding of base_mm
-    out.slack_mm = float(4e-7 * (1 + largest) * out.mm_per_t + 1.2e-7 * std::abs(out.base_mm));
+    out.slack_mm =
+        float(4e-7 * (1 + largest) * out.mm_per_t + 1.2e-7 * std::abs(out.base_mm) + instance.far_slack / instance.k);
     out.pixel = float(std::sqrt(dot(instance.step_x, instance.step_x)));
     return out;
 }

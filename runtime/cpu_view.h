@@ -61,12 +61,15 @@ struct InstanceView {
     // tau, tau x and tau y of a point p are rows of the inverse of (w0, step_x, step_y) times p - eye
     double row_tau[3], row_x[3], row_y[3];
     float normal[3][3];   // part to world, for normals: inverse transpose, any length
+    double far_slack = 0; // what doubles lose of a tau where the eye stands far back for parallel rays, part units
     bool outside = false; // seen_from_outside
 };
 
 struct View {
     double eye_mm[3], w0[3], step_x[3], step_y[3]; // world
-    double tau_ref = 0;                            // mm; distances are stored relative to this. A float's value
+    double tau_ref = 0;                            // mm; distances are stored relative to this
+    double plane_mm = 0;                           // CameraRays::plane_mm: what has a smaller tau is not seen
+    double depth_ref = 0;                          // tau_ref - plane_mm, a float's value
     std::vector<InstanceView> instances;
     std::optional<uint32_t> alone; // the only instance that rays meet
 };

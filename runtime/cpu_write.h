@@ -298,7 +298,7 @@ HWY_ATTR HWY_INLINE SeenPacket see_packet(const BlockJob& job, const Packet& pac
     const real3 along = w0 + packet.x * step_x + packet.y * step_y;
     const real speed = length(along);
     seen.depth =
-        select(seen.hits, (float(view.tau_ref) + hit.best) * speed, real(std::numeric_limits<float>::infinity()));
+        select(seen.hits, (float(view.depth_ref) + hit.best) * speed, real(std::numeric_limits<float>::infinity()));
     const real size = length(shading.normal);
     const mask has_normal = size > 0.0f && seen.hits;
     // a surface without a normal faces the eye

@@ -138,7 +138,7 @@ bool Effects::rim_of(int x, int y, float& offset_x, float& offset_y) const
                 continue;
             constexpr float kAlike = 0.3f; // cosine: a rim's normals turn quickly, a border's jump
             if (std::abs(frame_.depth_mm[at(tx, ty)] - frame_.depth_mm[i]) >
-                    8 * rays_.pixel * frame_.depth_mm[i] / std::sqrt(std::max(g, 1e-4f)) ||
+                    8 * rays_.footprint(frame_.depth_mm[i]) / std::sqrt(std::max(g, 1e-4f)) ||
                 dot(n, normal(at(tx, ty))) < kAlike)
                 continue;
             sum += float(side) * (facing_square(tx, ty) - g);
@@ -169,7 +169,7 @@ bool Effects::is_rim(int x, int y, float& offset_x, float& offset_y) const
         return false;
     constexpr float kGap = 2; // pixels
     const size_t t = at(tx, ty);
-    return !is_hit(t) || frame_.depth_mm[t] > frame_.depth_mm[at(x, y)] * (1 + kGap * rays_.pixel);
+    return !is_hit(t) || frame_.depth_mm[t] > rays_.beyond(frame_.depth_mm[at(x, y)], kGap);
 }
 
 /// Half a pixel towards neighbours that this surface hides: where a surface ends and neither a border nor a rim says
@@ -179,7 +179,7 @@ bool Effects::ends_here(int x, int y, float& offset_x, float& offset_y) const
     const float depth = frame_.depth_mm[at(x, y)];
     const auto ends = [&](int dx, int dy) {
         const int tx = x + dx, ty = y + dy;
-        return on_picture(tx, ty) && frame_.depth_mm[at(tx, ty)] > depth * (1 + rays_.pixel) && hides(x, y, tx, ty);
+        return on_picture(tx, ty) && frame_.depth_mm[at(tx, ty)] > rays_.beyond(depth, 1) && hides(x, y, tx, ty);
     };
     const int dx = int(ends(1, 0)) - int(ends(-1, 0)), dy = int(ends(0, 1)) - int(ends(0, -1));
     if (dx == 0 && dy == 0)

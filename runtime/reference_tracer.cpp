@@ -28,8 +28,8 @@ using reference::Vec3;
 using reference::operator*;
 using reference::operator+;
 
-constexpr uint32_t kLookDone = 0;           // LookBit
-constexpr uint kDefaultColor = 0xffb4b0acu; // of what has none, sRGB
+constexpr uint32_t kLookDone = kLookOrthographic; // LookBit
+constexpr uint kDefaultColor = 0xffb4b0acu;       // of what has none, sRGB
 
 /// The colour of a hit, linear light: what shaders/shared/shading.h computes, written anew in double.
 Vec3 shaded(uint rgba, const Vec3& normal, const Vec3& to_eye)
@@ -92,13 +92,21 @@ public:
 private:
     void trace(const RenderOptions& options, WorkCounts& work, Frame& frame) const
     {
-        const CameraRays rays = camera_rays(options.camera, options.width, options.height);
+        const bool parallel = options.camera.orthographic_mm > 0;
+        const CameraRays from_eye = camera_rays(options.camera, options.width, options.height);
+        const ParallelRays side_by_side = parallel_rays(options.camera, options.width, options.height);
+        const auto ray_at = [&](double x, double y) -> reference::Ray {
+            if (parallel)
+                return {side_by_side.corner + side_by_side.step_x * x + side_by_side.step_y * y,
+                        side_by_side.direction};
+            return {from_eye.eye, from_eye.corner + from_eye.step_x * x + from_eye.step_y * y};
+        };
         std::atomic<uint64_t> patches{0}, uncertified{0};
         std::mutex telling;
         uint32_t rows_done = 0;
         tbb::parallel_for(0u, options.height, [&](uint32_t y) {
             for (uint32_t x = 0; x < options.width; ++x) {
-                const reference::Ray ray{rays.eye, rays.corner + rays.step_x * (x + 0.5) + rays.step_y * (y + 0.5)};
+                const reference::Ray ray = ray_at(x + 0.5, y + 0.5);
                 const ReferenceHit hit = closest_.closest(ray);
                 write(options, ray, hit, size_t(y) * options.width + x, frame);
                 patches.fetch_add(hit.patches, std::memory_order_relaxed);

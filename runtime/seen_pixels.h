@@ -31,6 +31,12 @@ struct PictureRays {
         step_y = vec([&](size_t i) { return rays.step_y[i]; });
         const Vec middle = direction(width_px / 2, height_px / 2);
         pixel = std::sqrt(dot(step_x, step_x)) / std::sqrt(dot(middle, middle));
+        if (camera.orthographic_mm > 0) {
+            const ParallelRays side_by_side = parallel_rays(camera, width, height);
+            parallel_px = static_cast<float>(camera.orthographic_mm / height);
+            apart_x = vec([&](size_t i) { return side_by_side.step_x[i]; });
+            apart_y = vec([&](size_t i) { return side_by_side.step_y[i]; });
+        }
     }
 
     Vec direction(int x, int y) const
@@ -46,10 +52,21 @@ struct PictureRays {
         return {d.x * scale, d.y * scale, d.z * scale};
     }
     bool on_picture(int x, int y) const { return x >= 0 && y >= 0 && x < width_px && y < height_px; }
+    bool parallel() const { return parallel_px > 0; }
+    /// A pixel's width at a depth, mm.
+    float footprint(float depth) const { return parallel() ? parallel_px : pixel * depth; }
+    /// A depth and so many footprints.
+    float beyond(float depth, float pixels) const
+    {
+        return parallel() ? depth + pixels * parallel_px : depth * (1 + pixels * pixel);
+    }
 
     int width_px, height_px;
     Vec corner{}, step_x{}, step_y{};
     float pixel = 0; // a pixel's width at distance 1
+    // Of parallel rays: a pixel's width in mm, and how far apart neighbours' rays are; else 0
+    float parallel_px = 0;
+    Vec apart_x{}, apart_y{};
 };
 
 /// The pixels [x0, x1) x [y0, y1) of a picture, in arrays whose rows are `stride` pixels apart. Channels: Frame.
@@ -77,7 +94,9 @@ struct SeenPixels {
         if (!is_hit(t))
             return true;
         constexpr float kGap = 0.5f; // pixels: nearer surfaces are told apart by their borders
-        const float gap = kGap * rays.pixel * depth_mm[i];
+        const float gap = kGap * rays.footprint(depth_mm[i]);
+        if (rays.parallel())
+            return depth_mm[t] > plane_depth(i, x, y, tx, ty) + gap && plane_depth(t, tx, ty, x, y) > depth_mm[i] + gap;
         const Vec to_i = rays.unit_direction(x, y), to_t = rays.unit_direction(tx, ty);
         return depth_mm[t] > plane_depth(i, to_i, to_t) + gap && plane_depth(t, to_t, to_i) > depth_mm[i] + gap;
     }
@@ -91,6 +110,17 @@ private:
         const float here = dot(n, along_here), there = dot(n, along_there);
         constexpr float kFlat = 0.2f; // of the other angle's sine: the plane passes the eye's rays at nothing like it
         return there * here > kFlat * here * here ? depth_mm[i] * here / there : depth_mm[i];
+    }
+    /// Likewise where rays are parallel: (x, y) shows pixel i, and the ray of (tx, ty) runs beside.
+    float plane_depth(size_t i, int x, int y, int tx, int ty) const
+    {
+        // n . (o + s d - p) = 0 with p = o_i + depth d
+        const Vec n = normal(i);
+        const float along = dot(n, rays.unit_direction(x, y));
+        const float across =
+            static_cast<float>(tx - x) * dot(n, rays.apart_x) + static_cast<float>(ty - y) * dot(n, rays.apart_y);
+        constexpr float kFlat = 1e-3f; // cosine: a plane seen so flat tells nothing of its depth a pixel beside
+        return std::abs(along) > kFlat ? depth_mm[i] - across / along : depth_mm[i];
     }
 };
 

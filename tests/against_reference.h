@@ -94,14 +94,24 @@ inline AgainstReference compare_with_reference(const Frame& frame, const Camera&
     using reference::Vec3;
     using reference::operator+;
     using reference::operator*;
+    // Parallel rays are compared with the reference's own. What a hair changes is asked of the pinhole far back, whose
+    // rays a hair turns as it would move parallel ones.
     const CameraRays rays = camera_rays(camera, frame.width, frame.height);
+    const bool parallel = camera.orthographic_mm > 0;
+    const ParallelRays beside = parallel_rays(camera, frame.width, frame.height);
     std::vector<AgainstReference> rows(frame.height);
     tbb::parallel_for(0u, frame.height, [&](uint32_t y) {
         AgainstReference& row = rows[y];
         for (uint32_t x = 0; x < frame.width; ++x) {
             const size_t i = size_t(y) * frame.width + x;
-            const reference::Ray ray{rays.eye, rays.corner + rays.step_x * (x + 0.5) + rays.step_y * (y + 0.5)};
+            const reference::Ray turned{rays.eye, rays.corner + rays.step_x * (x + 0.5) + rays.step_y * (y + 0.5)};
+            const reference::Ray ray =
+                parallel ? reference::Ray{beside.corner + beside.step_x * (x + 0.5) + beside.step_y * (y + 0.5),
+                                          beside.direction}
+                         : turned;
             const ReferenceHit hit = closest.closest(ray);
+            ReferenceHit from_eye = hit;
+            from_eye.distance_mm += rays.plane_mm;
             const double speed = reference::length(ray.direction);
             const double pixel = std::max(reference::length(rays.step_x), reference::length(rays.step_y)) / speed;
             ++row.rays;
@@ -119,7 +129,7 @@ inline AgainstReference compare_with_reference(const Frame& frame, const Camera&
 
             FaultyPixel fault;
             bool wrong = true;
-            const double footprint = pixel * hit.distance_mm;
+            const double footprint = pixel * from_eye.distance_mm;
             const double depth_px = std::abs(double(frame.depth_mm[i]) - hit.distance_mm) / footprint;
             if (hit.hit != traced) {
                 fault.fault = hit.hit ? Fault::FalseMiss : Fault::FalseHit;
@@ -140,7 +150,7 @@ inline AgainstReference compare_with_reference(const Frame& frame, const Camera&
                 const Vec3 n{frame.normal[3 * i], frame.normal[3 * i + 1], frame.normal[3 * i + 2]};
                 const double deg = reference::angle_deg(n, hit.normal);
                 if (depth_px > kDepthOffPx || deg > kNormalOffDeg) {
-                    const Hair hair = closest.hair(ray, hit, rays.step_x, rays.step_y);
+                    const Hair hair = closest.hair(turned, from_eye, rays.step_x, rays.step_y);
                     const bool of_face = hair.doubt != Doubt::None; // beside a border
                     row.depths_off += !of_face && depth_px > kDepthOffPx && depth_px * footprint > hair.depth_mm;
                     row.normals_off[hit.kind] += !of_face && deg > kNormalOffDeg && deg > hair.turn_deg;
@@ -160,7 +170,7 @@ inline AgainstReference compare_with_reference(const Frame& frame, const Camera&
             fault.y = y;
             fault.hair_px = std::numeric_limits<double>::infinity();
             for (const double reach_px : {1e-3, 1e-2, 0.1, 1.0}) {
-                const Doubt doubt = closest.hair(ray, hit, rays.step_x, rays.step_y, reach_px).doubt;
+                const Doubt doubt = closest.hair(turned, from_eye, rays.step_x, rays.step_y, reach_px).doubt;
                 if (reach_px == 1e-3)
                     fault.doubt = doubt;
                 if (doubt == Doubt::None || (doubt == Doubt::Face && fault.fault != Fault::WrongFace))

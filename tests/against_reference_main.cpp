@@ -24,6 +24,7 @@ using Json = nlohmann::ordered_json;
 
 struct Request {
     std::vector<std::string> packs, views{"iso", "front", "top"}, devices{"cpu"};
+    bool ortho = false; // parallel rays
     uint32_t width = 320, height = 180;
     float error_px = RenderOptions{}.error_px;
     size_t listed = 5;
@@ -190,7 +191,9 @@ int measure(const std::string& path, const Request& request, std::map<std::strin
         }
         for (const std::string& view : request.views) {
             Camera camera;
-            if (!standard_view(view, reach, double(request.width) / request.height, 35, camera))
+            const double aspect = double(request.width) / request.height;
+            if (!(request.ortho ? standard_orthographic_view(view, reach, aspect, 0, camera)
+                                : standard_view(view, reach, aspect, 35, camera)))
                 return fail(view, "no such view");
             Outcome outcome;
             const Result<Frame> frame = compare(**tracer, closest, request, camera, outcome);
@@ -220,6 +223,7 @@ int main(int argc, char** argv)
     app.add_option("--height", request.height)->check(CLI::Range(1u, 16384u));
     app.add_option("--error-px", request.error_px, "The tracers' own dial");
     app.add_option("--listed", request.listed, "Pixels listed in each line, sure faults of a picture first");
+    app.add_flag("--ortho", request.ortho, "By parallel rays");
     app.add_option("--rays", request.rays, "Rays a pack, from around and inside of it, in place of the views");
     CLI11_PARSE(app, argc, argv);
     size_t failed = 0;
