@@ -160,8 +160,6 @@ private:
     HWY_ATTR HWY_NOINLINE real see_through(const Packet& packet, const PixelRect& rect, const PacketHit& first,
                                            SeenPacket& seen)
     {
-        constexpr float kLeast = 1.0f / 1024; // what shines through less is not followed
-        constexpr int kMostLayers = 256;
         const PixelPlaces places(*job_.places);
         const real speed = length(places.along(packet));
         real left = select(seen.hits, 1.0f - seen.opacity, real(0.0f));
@@ -170,8 +168,8 @@ private:
         kept_ = nullptr;
         const CutSpan whole = span_;
         PacketHit hit = first;
-        mask on = seen.hits && left > kLeast;
-        for (int layer = 1; layer < kMostLayers && any_lane(on); ++layer) {
+        mask on = seen.hits && left > kLeastLeft;
+        for (uint layer = 1; layer < kMostLayers && any_lane(on); ++layer) {
             const real past = select(on, hit.best, real(0.0f));
             const real away = start_distance(places.at(packet, past), places.footprint(past) * job_.error_px);
             span_.begin = select(on, past + away / speed, real(kHuge));
@@ -182,7 +180,7 @@ private:
             const real share = select(on, left * behind.opacity, real(0.0f));
             sum = sum + select(on, behind.color, real3(real(0.0f), real(0.0f), real(0.0f))) * share;
             left = left - share;
-            on = on && left > kLeast;
+            on = on && left > kLeastLeft;
         }
         span_ = whole;
         kept_ = kept;

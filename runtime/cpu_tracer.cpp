@@ -65,8 +65,8 @@ public:
         const Result<MaterialTable> materials = resolve_materials(scene_->pack.image, options.look);
         if (!materials.ok())
             return materials.error();
-        const bool asks_free_rays =
-            (options.shade && has_light_rays(options.look)) || !options.look.section.planes.empty();
+        const bool asks_free_rays = (options.shade && (has_light_rays(options.look) || has_mirrors(options.look))) ||
+                                    !options.look.section.planes.empty();
         if (asks_free_rays && to_part_.empty())
             to_part_ = world_to_part(scene_->pack.image);
         if (asks_borders && !border_cells_)

@@ -2,6 +2,7 @@
 
 #include "runtime/frame_effects.h"
 #include "runtime/light_view.h"
+#include "runtime/materials.h"
 #include "runtime/stochastic_frames.h"
 #include "runtime/surface_map.h"
 
@@ -282,6 +283,10 @@ EffectPlan effect_plan(const PackFacts& facts, const RenderOptions& options, Dev
     plan.reuses_hits = vulkan && options.reuse_last && !plan.stochastic;
     plan.map = has_map(options) ? options.look.map.map : SurfaceMap::None;
     plan.look = look_bits(options);
+    plan.materials = options.shade && has_materials(options.look);
+    plan.layers = (plan.look & kLookTransparency) != 0;
+    plan.mirrors = (plan.look & kLookMirrors) != 0;
+    plan.environment = (plan.look & kLookEnvironment) != 0;
     plan.stack_size = facts.stack_size;
     if (device == DeviceKind::SoftwareVulkan) {
         plan.local_floats = facts.largest_net_floats <= kMostLocalFloats ? facts.largest_net_floats : 0;

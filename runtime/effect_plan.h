@@ -55,6 +55,7 @@ struct EffectPlan {
     bool edges = false; // borders are measured beside hits
     bool lit = false;   // lights and the sky are gathered for each pixel (runtime/light_view.h)
     bool cut = false;   // rays begin and end at section planes
+    bool materials = false, layers = false, mirrors = false, environment = false;
     bool stochastic = false, keeps_hits = false, reuses_hits = false;
     SurfaceMap map = SurfaceMap::None; // none also where it would not be seen
     uint32_t look = 0;                 // LookBit

@@ -118,8 +118,8 @@ bool has_lights(const SceneLook& look)
 bool has_light_rays(const SceneLook& look)
 {
     const auto throws_shadows = [](const Light& light) { return light.shadows; };
-    return shows_light(look) && (look.occlusion.samples > 0 || has_mirrors(look) ||
-                                 std::any_of(look.lights.begin(), look.lights.end(), throws_shadows));
+    return shows_light(look) &&
+           (look.occlusion.samples > 0 || std::any_of(look.lights.begin(), look.lights.end(), throws_shadows));
 }
 
 Status check_lights(const SceneLook& look)

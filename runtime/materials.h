@@ -7,23 +7,13 @@
 #include "format/pack_image.h"
 #include "format/result.h"
 #include "runtime/scene_look.h"
+#include "shaders/material_layout.h"
 
 #include <cstddef>
 #include <cstdint>
 #include <vector>
 
 namespace trimray {
-
-/// One material, as devices have it: 4-byte fields, no padding.
-struct MaterialRecord {
-    float color[3];  // linear light
-    float has_color; // 1; 0: the pack's colour
-    float opacity;   // [0, 1]
-    float mirror;    // [0, 1]
-    float specular;  // [0, 1]
-    float reserved;  // zero
-};
-static_assert(sizeof(MaterialRecord) == 32);
 
 struct MaterialTable {
     std::vector<MaterialRecord> materials; // distinct, those that some face of some placement has; in order of classes

@@ -118,7 +118,9 @@ Specialisation specialisation(const EffectPlan& plan, bool count)
           std::pair{plan.rims, kFeatureRims}, std::pair{plan.shade, kFeatureShade}, std::pair{count, kFeatureCount},
           std::pair{plan.edges, kFeatureEdges}, std::pair{plan.stochastic, kFeatureStochastic},
           std::pair{plan.keeps_hits, kFeatureKept}, std::pair{plan.reuses_hits, kFeatureReuse},
-          std::pair{plan.lit, kFeatureLights}, std::pair{plan.cut, kFeatureCut}})
+          std::pair{plan.lit, kFeatureLights}, std::pair{plan.cut, kFeatureCut},
+          std::pair{plan.materials, kFeatureMaterials}, std::pair{plan.layers, kFeatureLayers},
+          std::pair{plan.mirrors, kFeatureMirrors}, std::pair{plan.environment, kFeatureEnvironment}})
         features |= wanted ? feature : 0u;
     Specialisation constants{};
     constants[kSpecTrimMode] = plan.trim == TrimMode::Sdf      ? kTrimByTexture

@@ -4,6 +4,7 @@
 #include "runtime/effect_plan.h"
 #include "runtime/frame_effects.h"
 #include "runtime/light_view.h"
+#include "runtime/materials.h"
 #include "runtime/section_view.h"
 #include "runtime/stochastic_frames.h"
 #include "runtime/surface_map.h"
@@ -13,6 +14,7 @@
 #include "runtime/vk_device.h"
 #include "runtime/vk_pipeline.h"
 #include "runtime/vk_scene.h"
+#include "shaders/look_layout.h"
 
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
@@ -42,12 +44,19 @@ const uint32_t kLightSpirv[] =
 const uint32_t kCapsSpirv[] =
 #include "caps.comp.inc"
     ;
+const uint32_t kMirrorSpirv[] =
+#include "mirror.comp.inc"
+    ;
+const uint32_t kBlendSpirv[] =
+#include "blend.comp.inc"
+    ;
 
 // Bounds the memory of a band and the time of a dispatch, which some drivers end after a second or two
 constexpr size_t kBandBytes = size_t{32} << 20;
 
-constexpr uint32_t kLookDone =
-    kLookLights | kLookShadows | kLookSoftShadows | kLookOcclusion | kLookMap | kLookSection | kLookCaps;
+constexpr uint32_t kLookDone = kLookLights | kLookShadows | kLookSoftShadows | kLookOcclusion | kLookMap |
+                               kLookSection | kLookCaps | kLookMaterials | kLookTransparency | kLookMirrors |
+                               kLookEnvironment;
 
 // Pixels whose subgroup reached that limit are traced again, one by one, in dispatches of so many
 constexpr uint32_t kMostRetries = 4096;
@@ -55,14 +64,28 @@ constexpr uint32_t kMostRetries = 4096;
 // Rays a pixel that one dispatch of light.comp casts: on the software driver a ray takes what the loop limit allows
 constexpr uint32_t kSamplesADispatch = 16, kSoftwareSamplesADispatch = 1;
 
-bool is_lit(const RenderOptions& options)
+// Whether any ray begins elsewhere than at the eye
+bool needs_free_rays(const RenderOptions& options, const EffectPlan& plan)
 {
-    return options.shade && has_lights(options.look);
+    return has_caps(options.look.section) || plan.mirrors || (plan.lit && has_light_rays(options.look));
 }
 
-bool is_cut(const RenderOptions& options)
+// What kBindMaterials holds
+std::vector<uint32_t> material_words(const MaterialTable& table)
 {
-    return !options.look.section.planes.empty();
+    const auto head_words = uint32_t{sizeof(MaterialHead) / sizeof(uint32_t)};
+    const auto count = static_cast<uint32_t>(table.materials.size() * sizeof(MaterialRecord) / sizeof(uint32_t));
+    MaterialHead head{};
+    head.face_classes = table.face_classes;
+    head.of_classes = head_words + count;
+    head.instance_class = head.of_classes + static_cast<uint32_t>(table.of_classes.size());
+    head.face_class = head.instance_class + static_cast<uint32_t>(table.instance_class.size());
+    std::vector<uint32_t> words(head_words + count);
+    std::memcpy(words.data(), &head, sizeof head);
+    std::memcpy(words.data() + head_words, table.materials.data(), count * sizeof(uint32_t));
+    for (const std::vector<uint32_t>* array : {&table.of_classes, &table.instance_class, &table.face_class})
+        words.insert(words.end(), array->begin(), array->end());
+    return words;
 }
 
 bool reuses_hits(const RenderOptions& options)
@@ -102,11 +125,12 @@ private:
                                       bool count);
     Status prepare_frame(const FrameSetup& setup, uint32_t rows_per_band);
     Status prepare_edges(const RenderOptions& options, uint32_t rows_per_band);
-    Status prepare_map(const RenderOptions& options, uint32_t rows_per_band);
     Status prepare_hits(std::initializer_list<uint32_t> bindings, size_t pixels, size_t pixel_bytes,
                         const char* option);
     Status upload(uint32_t binding, std::span<const std::byte> bytes, const char* name);
-    Status prepare_look(const RenderOptions& options, const FrameSetup& setup, uint32_t rows_per_band);
+    Status prepare_look(const RenderOptions& options, const EffectPlan& plan, const FrameSetup& setup,
+                        uint32_t rows_per_band);
+    Status prepare_materials(const RenderOptions& options, const EffectPlan& plan);
     Status prepare_kept(const RenderOptions& options);
     Result<bool> prepare_last_hits(const RenderOptions& options);
     Status fill(uint32_t binding, uint32_t word);
@@ -124,8 +148,14 @@ private:
     Result<double> cast_free_rays(const ComputePipeline& pipeline, FrameView view);
     Result<double> gather_light(FrameView view);
     Result<double> find_caps(FrameView view);
-    Result<double> trace_band(const ComputePipeline& pipeline, const FrameView& view, bool read_back);
-    Result<double> trace_frame(const ComputePipeline& pipeline, FrameView view, uint32_t rows_per_band, Frame* frame);
+    Result<double> follow_mirrors(FrameView view);
+    Result<double> trace_layer(FrameView view, uint32_t layer, bool read_back);
+    Result<std::pair<double, uint32_t>> blend(FrameView view, uint32_t layer);
+    Result<double> trace_layers_behind(const FrameView& view, bool read_back);
+    std::array<const VulkanBuffer*, kFrameBindings> bound_buffers() const;
+    void swap_layers();
+    Result<double> trace_band(const FrameView& view, bool read_back);
+    Result<double> trace_frame(FrameView view, uint32_t rows_per_band, Frame* frame);
     void take_pixels(const FrameView& view, Frame& frame) const;
     void take_edges(const FrameView& view);
     double draw(const RenderOptions& options, Frame& frame);
@@ -146,10 +176,18 @@ private:
     VulkanBuffer retries_upload_;              // of kMostRetries indices
     VulkanBuffer counts_readback_;
     FrameLights lights_; // of the picture at hand
-    // light.comp and caps.comp as the picture at hand needs them; null: it does not
-    ComputePipeline* light_pipeline_ = nullptr;
-    ComputePipeline* caps_pipeline_ = nullptr;
-    VulkanBuffer nothing_; // stands for what the picture does not need
+    // The pipelines that the picture at hand needs; null: it does not
+    struct Pipelines {
+        ComputePipeline* primary = nullptr;
+        ComputePipeline* caps = nullptr;
+        ComputePipeline* light = nullptr;
+        ComputePipeline* mirror = nullptr;
+        ComputePipeline* blend = nullptr;
+    };
+    bool behind_first_ = false; // kBindPixels is layer_pixels_
+    Pipelines use_;
+    VulkanBuffer layer_pixels_; // of layers behind the first
+    VulkanBuffer nothing_;      // stands for what the picture does not need
     QueryPool timestamps_;
     struct MadePipeline {
         const uint32_t* spirv;
@@ -202,6 +240,14 @@ Status VulkanTracer::upload()
         timestamps_.device = device_.get();
     }
     return device_->validation_status();
+}
+
+std::array<const VulkanBuffer*, kFrameBindings> VulkanTracer::bound_buffers() const
+{
+    std::array<const VulkanBuffer*, kFrameBindings> bound{};
+    for (uint32_t i = 0; i < kFrameBindings; ++i)
+        bound[i] = buffers_[i].size_bytes() > 0 ? &buffers_[i] : &nothing_;
+    return bound;
 }
 
 Status VulkanTracer::upload(uint32_t binding, std::span<const std::byte> bytes, const char* name)
@@ -303,80 +349,93 @@ Status VulkanTracer::prepare_edges(const RenderOptions& options, uint32_t rows_p
     return Done{};
 }
 
-// Uploads what a picture's lights and section planes are, and makes room for what is kept of a pixel between
-// dispatches. Nothing is made for what the picture has not.
-Status VulkanTracer::prepare_look(const RenderOptions& options, const FrameSetup& setup, uint32_t rows_per_band)
+// Uploads what a scene's look comes to, and makes room for what is kept of a pixel between dispatches. Nothing is made
+// for what the picture has not.
+Status VulkanTracer::prepare_look(const RenderOptions& options, const EffectPlan& plan, const FrameSetup& setup,
+                                  uint32_t rows_per_band)
 {
     lights_ = {};
-    const bool lit = is_lit(options), cut = is_cut(options);
-    if (!lit && !cut)
+    const bool mapped = plan.map != SurfaceMap::None;
+    if (!plan.lit && !plan.cut && !plan.layers && !mapped)
         return Done{};
     const PackImage& image = scene_->pack.image;
+    const SceneLook& scene_look = options.look;
     const ViewRays rays{setup.eye, setup.w0, setup.step_x, setup.step_y, setup.view.tau_ref};
-    if (lit)
+    LookFrame look{};
+    look.places = place_view(image, rays);
+    if (plan.cut)
+        look.section = section_view(image, scene_look.section, rays);
+    if (mapped)
+        look.map = map_view(image, scene_look.map);
+    if (plan.lit) {
         lights_ = frame_lights(image, options);
-    const PlaceView places = place_view(image, rays);
-    std::vector<LightRecord> records = lights_.lights;
-    records.resize(kMostLights);
+        look.light = lights_.view;
+        std::copy(lights_.lights.begin(), lights_.lights.end(), look.lights);
+    }
     std::vector<std::byte> bytes;
-    const auto append = [&bytes](auto span) {
-        const std::span<const std::byte> more = std::as_bytes(span);
-        bytes.insert(bytes.end(), more.begin(), more.end());
-    };
-    append(std::span(&places, 1));
-    append(std::span(&lights_.view, 1));
-    append(std::span(records));
-    append(std::span(lights_.samples));
-    if (const Status uploaded = upload(kBindPlaces, bytes, "the lights"); !uploaded)
+    for (const std::span<const std::byte> part :
+         {std::as_bytes(std::span(&look, 1)), std::as_bytes(std::span(lights_.samples))})
+        bytes.insert(bytes.end(), part.begin(), part.end());
+    if (const Status uploaded = upload(kBindLook, bytes, "the look"); !uploaded)
         return uploaded;
     const size_t band_pixels = size_t{rows_per_band} * options.width;
-    if (lit)
-        if (const Status ready = prepare_hits({kBindLitPixels}, band_pixels, sizeof(LitPixel), "the lights"); !ready)
-            return ready;
-    if (cut) {
-        const SectionView section = section_view(image, options.look.section, rays);
-        if (const Status uploaded = upload(kBindSection, std::as_bytes(std::span(&section, 1)), "the section");
-            !uploaded)
-            return uploaded;
+    const bool free_rays = needs_free_rays(options, plan);
+    struct PixelArray {
+        bool wanted;
+        uint32_t binding;
+        size_t bytes;
+    };
+    for (const PixelArray& array : {PixelArray{plan.lit, kBindLitPixels, sizeof(LitPixel)},
+                                    PixelArray{has_caps(scene_look.section), kBindCaps, sizeof(CapState)},
+                                    PixelArray{measures(plan.map), kBindMapValues, sizeof(float)},
+                                    PixelArray{plan.layers || plan.mirrors, kBindPaths, sizeof(PathState)}})
+        if (array.wanted)
+            if (const Status ready = prepare_hits({array.binding}, band_pixels, array.bytes, "the look"); !ready)
+                return ready;
+    if (measures(plan.map) && values_readback_.size_bytes() < band_pixels * sizeof(float)) {
+        Result<VulkanBuffer> readback =
+            VulkanBuffer::create(*device_, BufferUse::Readback, band_pixels * sizeof(float), "the map's values");
+        if (!readback)
+            return readback.error();
+        values_readback_ = std::move(*readback);
     }
-    if (has_caps(options.look.section))
-        if (const Status ready = prepare_hits({kBindCaps}, band_pixels, sizeof(CapState), "the section"); !ready)
-            return ready;
-    if (!(lit && has_light_rays(options.look)) && !has_caps(options.look.section))
-        return Done{};
-    if (buffers_[kBindToPart].size_bytes() == 0) {
+    if (plan.layers && layer_pixels_.size_bytes() < band_pixels * sizeof(FramePixel)) {
+        Result<VulkanBuffer> layer =
+            VulkanBuffer::create(*device_, BufferUse::Storage, band_pixels * sizeof(FramePixel), "the layers");
+        if (!layer)
+            return layer.error();
+        layer_pixels_ = std::move(*layer);
+    }
+    if (free_rays && buffers_[kBindToPart].size_bytes() == 0) {
         const std::vector<WorldToPart> to_part = world_to_part(image);
         if (const Status uploaded = upload(kBindToPart, std::as_bytes(std::span(to_part)), "the placements"); !uploaded)
             return uploaded;
     }
-    return device_->is_software() ? prepare_hits({kBindStopped}, band_pixels + 1, sizeof(uint32_t), "free rays")
-                                  : Status(Done{});
+    if (free_rays && device_->is_software())
+        return prepare_hits({kBindStopped}, band_pixels + 1, sizeof(uint32_t), "free rays");
+    return plan.layers ? prepare_hits({kBindStopped}, 1, sizeof(uint32_t), "the layers") : Status(Done{});
 }
 
-// Uploads a map's settings and makes the buffers of a band's values. Nothing is made where none is asked for.
-Status VulkanTracer::prepare_map(const RenderOptions& options, uint32_t rows_per_band)
+// Uploads what faces are made of and what is around the model, where the scene says so.
+Status VulkanTracer::prepare_materials(const RenderOptions& options, const EffectPlan& plan)
 {
-    const SurfaceMapLook& look = options.look.map;
-    if (!has_map(options))
+    if (plan.materials) {
+        const Result<MaterialTable> table = resolve_materials(scene_->pack.image, options.look);
+        if (!table)
+            return table.error();
+        const std::vector<uint32_t> words = material_words(*table);
+        if (const Status uploaded = upload(kBindMaterials, std::as_bytes(std::span(words)), "the materials"); !uploaded)
+            return uploaded;
+    }
+    if (!plan.environment)
         return Done{};
-    const MapView settings = map_view(scene_->pack.image, look);
-    Result<VulkanBuffer> map = upload_storage(*device_, std::as_bytes(std::span(&settings, 1)), "the map");
-    if (!map)
-        return map.error();
-    buffers_[kBindMap] = std::move(*map);
-    const size_t band_pixels = size_t{rows_per_band} * options.width;
-    if (!measures(look.map))
-        return Done{};
-    if (const Status ready = prepare_hits({kBindMapValues}, band_pixels, sizeof(float), "the map"); !ready)
-        return ready;
-    if (values_readback_.size_bytes() >= band_pixels * sizeof(float))
-        return Done{};
-    Result<VulkanBuffer> readback =
-        VulkanBuffer::create(*device_, BufferUse::Readback, band_pixels * sizeof(float), "the map's values");
-    if (!readback)
-        return readback.error();
-    values_readback_ = std::move(*readback);
-    return Done{};
+    const Environment& environment = *options.look.environment;
+    const std::array<uint32_t, 2> size{environment.width, environment.height};
+    std::vector<std::byte> bytes;
+    for (const std::span<const std::byte> part :
+         {std::as_bytes(std::span<const uint32_t>(size)), std::as_bytes(std::span<const float>(environment.rgb))})
+        bytes.insert(bytes.end(), part.begin(), part.end());
+    return upload(kBindEnvironment, bytes, "the environment");
 }
 
 // Makes buffers of one record a pixel, if those there are too small. `option`: what asks for them.
@@ -657,7 +716,7 @@ Result<double> VulkanTracer::gather_light(FrameView view)
         view.gathered = light;
         for (view.first_sample = 0; view.first_sample < sample_count; view.first_sample += at_once) {
             view.end_sample = std::min(view.first_sample + at_once, sample_count);
-            const Result<double> some_ms = cast_free_rays(*light_pipeline_, view);
+            const Result<double> some_ms = cast_free_rays(*use_.light, view);
             if (!some_ms)
                 return some_ms.error();
             ms += *some_ms;
@@ -681,7 +740,7 @@ Result<double> VulkanTracer::find_caps(FrameView view)
 {
     double ms = 0;
     for (view.gathered = 0; view.gathered < kInsideQuestions; ++view.gathered) {
-        const Result<double> some_ms = cast_free_rays(*caps_pipeline_, view);
+        const Result<double> some_ms = cast_free_rays(*use_.caps, view);
         if (!some_ms)
             return some_ms;
         ms += *some_ms;
@@ -689,44 +748,120 @@ Result<double> VulkanTracer::find_caps(FrameView view)
     return ms;
 }
 
-Result<double> VulkanTracer::trace_band(const ComputePipeline& pipeline, const FrameView& view, bool read_back)
+// Follows what mirrors in the band show. Returns milliseconds.
+Result<double> VulkanTracer::follow_mirrors(FrameView view)
 {
-    Result<double> ms = time_dispatch(pipeline, view, (view.width + kGroupSide - 1) / kGroupSide,
-                                      (view.row_count + kGroupSide - 1) / kGroupSide);
-    if (ms.ok() && read_back && device_->is_software()) {
-        if (const Status read = read_band(view); !read)
-            return read.error();
-        const Result<double> retry_ms = retrace_stopped(pipeline, view);
-        if (!retry_ms)
-            return retry_ms;
-        *ms += *retry_ms;
-    }
-    if (ms.ok() && caps_pipeline_) {
-        const Result<double> caps_ms = find_caps(view);
-        if (!caps_ms)
-            return caps_ms;
-        *ms += *caps_ms;
-    }
-    if (ms.ok() && light_pipeline_) {
+    double ms = 0;
+    for (uint32_t i = 0; i <= lights_.view.mirror_depth; ++i) {
+        view.gathered = i;
+        const Result<double> mirror_ms = cast_free_rays(*use_.mirror, view);
+        if (!mirror_ms)
+            return mirror_ms;
+        ms += *mirror_ms;
+        if (i == lights_.view.mirror_depth)
+            break;
         const Result<double> light_ms = gather_light(view);
         if (!light_ms)
             return light_ms;
-        *ms += *light_ms;
+        ms += *light_ms;
     }
-    if (!ms || !read_back || (device_->is_software() && !light_pipeline_ && !caps_pipeline_))
+    return ms;
+}
+
+// What the band's pixels see first, or behind the layers before. Returns milliseconds.
+Result<double> VulkanTracer::trace_layer(FrameView view, uint32_t layer, bool read_back)
+{
+    view.gathered = layer;
+    Result<double> ms = time_dispatch(*use_.primary, view, (view.width + kGroupSide - 1) / kGroupSide,
+                                      (view.row_count + kGroupSide - 1) / kGroupSide);
+    const auto add = [&ms](const Result<double>& more) { ms = more.ok() ? Result<double>(*ms + *more) : more; };
+    if (ms.ok() && read_back && device_->is_software()) {
+        if (const Status read = read_band(view); !read)
+            return read.error();
+        add(retrace_stopped(*use_.primary, view));
+    }
+    if (ms.ok() && use_.caps && layer == 0)
+        add(find_caps(view));
+    if (ms.ok() && use_.light)
+        add(gather_light(view));
+    if (ms.ok() && use_.mirror)
+        add(follow_mirrors(view));
+    return ms;
+}
+
+// Makes what dispatches call the pixels the first layer's, or those of the layers behind it.
+void VulkanTracer::swap_layers()
+{
+    std::swap(buffers_[kBindPixels], layer_pixels_);
+    behind_first_ = !behind_first_;
+    for (ComputePipeline* pipeline : {use_.primary, use_.caps, use_.light, use_.mirror, use_.blend})
+        if (pipeline)
+            pipeline->set_buffers(bound_buffers());
+}
+
+// Adds a layer to what is seen, or finishes (kBlendAll). Returns milliseconds, and how many pixels show what is behind.
+Result<std::pair<double, uint32_t>> VulkanTracer::blend(FrameView view, uint32_t layer)
+{
+    view.gathered = layer;
+    if (const Status none = fill(kBindStopped, 0); !none)
+        return none.error();
+    const Result<double> ms = time_dispatch(*use_.blend, view, (view.width + kGroupSide - 1) / kGroupSide,
+                                            (view.row_count + kGroupSide - 1) / kGroupSide);
+    if (!ms)
+        return ms.error();
+    const Result<uint32_t> count = read_stopped_count();
+    if (!count)
+        return count.error();
+    return std::pair{*ms, *count};
+}
+
+// Traces the layers of the band behind the first, and blends them. Returns milliseconds.
+Result<double> VulkanTracer::trace_layers_behind(const FrameView& view, bool read_back)
+{
+    double ms = 0;
+    Result<std::pair<double, uint32_t>> blended = blend(view, 0);
+    for (uint32_t layer = 1; blended.ok() && blended->second > 0 && layer < kMostLayers; ++layer) {
+        ms += blended->first;
+        if (layer == 1)
+            swap_layers();
+        const Result<double> layer_ms = trace_layer(view, layer, read_back);
+        if (layer_ms.ok()) {
+            ms += *layer_ms;
+            blended = blend(view, layer);
+        } else
+            blended = layer_ms.error();
+    }
+    if (behind_first_)
+        swap_layers();
+    if (!blended)
+        return blended.error();
+    const auto finished = blend(view, kBlendAll);
+    return finished.ok() ? Result<double>(ms + finished->first) : Result<double>(finished.error());
+}
+
+Result<double> VulkanTracer::trace_band(const FrameView& view, bool read_back)
+{
+    Result<double> ms = trace_layer(view, 0, read_back);
+    if (ms.ok() && use_.blend) {
+        const Result<double> behind_ms = trace_layers_behind(view, read_back);
+        if (!behind_ms)
+            return behind_ms;
+        *ms += *behind_ms;
+    }
+    const bool is_read = device_->is_software() && !use_.caps && !use_.light && !use_.mirror && !use_.blend;
+    if (!ms || !read_back || is_read)
         return ms;
     const Status read = read_band(view);
     return read.ok() ? ms : Result<double>(read.error());
 }
 
 // Traces all bands; `frame` may be null, then nothing is read back. Returns milliseconds.
-Result<double> VulkanTracer::trace_frame(const ComputePipeline& pipeline, FrameView view, uint32_t rows_per_band,
-                                         Frame* frame)
+Result<double> VulkanTracer::trace_frame(FrameView view, uint32_t rows_per_band, Frame* frame)
 {
     double ms = 0;
     for (view.first_row = 0; view.first_row < view.height; view.first_row += rows_per_band) {
         view.row_count = std::min(rows_per_band, view.height - view.first_row);
-        const Result<double> band_ms = trace_band(pipeline, view, frame != nullptr);
+        const Result<double> band_ms = trace_band(view, frame != nullptr);
         if (!band_ms)
             return band_ms.error();
         ms += *band_ms;
@@ -844,9 +979,12 @@ Result<Frame> VulkanTracer::render(const RenderOptions& options, RenderStats& st
         return ready.error();
     if (const Status ready = prepare_edges(options, rows_per_band); !ready)
         return ready.error();
-    if (const Status ready = prepare_look(options, *setup, rows_per_band); !ready)
+    RenderOptions traced = options;
+    traced.trim = *trim;
+    const EffectPlan plan = effect_plan(facts_, traced, device_kind());
+    if (const Status ready = prepare_look(options, plan, *setup, rows_per_band); !ready)
         return ready.error();
-    if (const Status ready = prepare_map(options, rows_per_band); !ready)
+    if (const Status ready = prepare_materials(options, plan); !ready)
         return ready.error();
     if (const Status ready = prepare_kept(options); !ready)
         return ready.error();
@@ -857,51 +995,37 @@ Result<Frame> VulkanTracer::render(const RenderOptions& options, RenderStats& st
     // With one frame it counts its work itself; with more an untimed one before them does
     const uint32_t frames = std::max(options.frames, 1u);
     const bool count_apart = frames > 1;
-    const Result<ComputePipeline*> counting = pipeline(kPrimarySpirv, *trim, options, true);
-    if (!counting)
-        return counting.error();
-    const Result<ComputePipeline*> timed = pipeline(kPrimarySpirv, *trim, options, !count_apart);
-    if (!timed)
-        return timed.error();
-    std::array<const VulkanBuffer*, kFrameBindings> bound{};
-    for (uint32_t i = 0; i < kFrameBindings; ++i)
-        bound[i] = buffers_[i].size_bytes() > 0 ? &buffers_[i] : &nothing_;
-    (*counting)->set_buffers(bound);
-    (*timed)->set_buffers(bound);
-    // of each, one that counts and one that is timed
-    const auto free_pipelines = [&](std::span<const uint32_t> spirv) -> Result<std::array<ComputePipeline*, 2>> {
-        std::array<ComputePipeline*, 2> made{};
-        for (size_t i = 0; i < 2; ++i) {
-            const Result<ComputePipeline*> one = pipeline(spirv, *trim, options, i == 0 || !count_apart);
+    const auto make_pipelines = [&](bool count) -> Result<Pipelines> {
+        Pipelines made;
+        struct Use {
+            bool wanted;
+            std::span<const uint32_t> spirv;
+            ComputePipeline*& made;
+        };
+        const bool light_rays = plan.lit && has_light_rays(options.look);
+        for (const Use& use :
+             {Use{true, kPrimarySpirv, made.primary}, Use{has_caps(options.look.section), kCapsSpirv, made.caps},
+              Use{light_rays, kLightSpirv, made.light}, Use{plan.mirrors, kMirrorSpirv, made.mirror},
+              Use{plan.layers, kBlendSpirv, made.blend}}) {
+            if (!use.wanted)
+                continue;
+            const Result<ComputePipeline*> one = pipeline(use.spirv, *trim, options, count);
             if (!one)
                 return one.error();
-            (*one)->set_buffers(bound);
+            (*one)->set_buffers(bound_buffers());
+            // an empty band: drivers that compile at the first dispatch do it here
             if (const Result<double> warm = time_dispatch(**one, setup->view, 1, 1); !warm)
                 return warm.error();
-            made[i] = *one;
+            use.made = *one;
         }
         return made;
     };
-    std::array<ComputePipeline*, 2> light_pipelines{}, caps_pipelines{};
-    if (is_lit(options) && has_light_rays(options.look)) {
-        const auto made = free_pipelines(kLightSpirv);
-        if (!made)
-            return made.error();
-        light_pipelines = *made;
-    }
-    if (has_caps(options.look.section)) {
-        const auto made = free_pipelines(kCapsSpirv);
-        if (!made)
-            return made.error();
-        caps_pipelines = *made;
-    }
-    const auto choose_free_pipelines = [&](size_t which) {
-        light_pipeline_ = light_pipelines[which];
-        caps_pipeline_ = caps_pipelines[which];
-    };
-    // an empty band: drivers that compile at the first dispatch do it here
-    if (const Result<double> warm = time_dispatch(**timed, setup->view, 1, 1); !warm)
-        return warm.error();
+    const Result<Pipelines> counting = make_pipelines(true);
+    if (!counting)
+        return counting.error();
+    const Result<Pipelines> timed = count_apart ? make_pipelines(false) : counting;
+    if (!timed)
+        return timed.error();
 
     if (const Status cleared = fill(kBindCounts, 0); !cleared)
         return cleared.error();
@@ -913,14 +1037,14 @@ Result<Frame> VulkanTracer::render(const RenderOptions& options, RenderStats& st
     choose_start(0);
     if (const Status none = forget_kept(); !none)
         return none.error();
-    choose_free_pipelines(0);
+    use_ = *counting;
     if (count_apart) {
-        if (const Result<double> ms = trace_frame(**counting, view, rows_per_band, nullptr); !ms)
+        if (const Result<double> ms = trace_frame(view, rows_per_band, nullptr); !ms)
             return ms.error();
         if (const Status none = forget_kept(); !none)
             return none.error();
     }
-    choose_free_pipelines(1);
+    use_ = *timed;
     Frame frame;
     const size_t pixels = size_t{options.width} * options.height;
     frame.width = options.width;
@@ -944,7 +1068,7 @@ Result<Frame> VulkanTracer::render(const RenderOptions& options, RenderStats& st
         // a software driver's frames are always read: only that shows what must be traced again
         const bool read = i + 1 == frames || device_->is_software() || has_effects(options);
         choose_start(i);
-        const Result<double> ms = trace_frame(**timed, view, rows_per_band, read ? &frame : nullptr);
+        const Result<double> ms = trace_frame(view, rows_per_band, read ? &frame : nullptr);
         if (!ms)
             return ms.error();
         // what the host draws counts as much as what the device traces

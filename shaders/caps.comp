@@ -10,6 +10,7 @@
 #include "format/kd_layout.h"
 #include "shaders/frame_layout.h"
 #include "shaders/light_layout.h"
+#include "shaders/material_layout.h"
 #include "shaders/section_layout.h"
 // first: the formulas fetch through it, and they make `scalar`, a layout there, a type
 #include "shaders/scene_buffers.glsl"
@@ -29,13 +30,13 @@
 #include "shaders/shared/trim_kd.h"
 #include "shaders/shared/trim_lookup.h"
 
+#include "shaders/materials.glsl"
 #define TRIMRAY_COLLECTS
 #include "shaders/ray_types.glsl"
 #include "shaders/free_rays.glsl"
 #include "shaders/crossings.glsl"
 #include "shaders/leaf_hit.glsl"
 #include "shaders/walk.glsl"
-#include "shaders/colors.glsl"
 #include "shaders/places.glsl"
 #include "shaders/light.glsl"
 #include "shaders/section.glsl"
@@ -78,11 +79,17 @@ bool ask(vec2 pixel, float past, inout CapState cap)
     return true;
 }
 
+vec3 leaf_color(uint leaf, uint instance)
+{
+    uint face = patches[leaves[leaf].patch].face;
+    return vector(face_material(face, faces[face], instance, instances[instance]).color);
+}
+
 vec3 cap_color(CapState cap, SectionPlaneView plane, vec2 at, vec3 to_eye, float width)
 {
     vec3 color = vector(section.color);
     if (section.has_color == 0u)
-        color = face_color(faces[patches[leaves[cap.leaf].patch].face], instances[cap.instance]);
+        color = leaf_color(cap.leaf, cap.instance);
     if (section.caps != kCapsHatched)
         return color;
     float slant = max(abs(dot(vector(plane.normal), to_eye)), 0.05f);
@@ -118,7 +125,9 @@ void write_cap(uint band_pixel, vec2 pixel, CutSpan span, CapState cap)
     if (has_feature(kFeatureShade)) {
         vec3 seen;
         if (has_feature(kFeatureLights)) {
-            LitPixel point = lit_pixel(pixel, span.begin, normal, to_eye, color, kSpecular);
+            MaterialRecord plain =
+                MaterialRecord(float[3](color.x, color.y, color.z), 1.0f, 1.0f, 0.0f, kSpecular, 0.0f);
+            LitPixel point = lit_point(place, place_width(span.begin), normal, to_eye, plain);
             lit_pixels[band_pixel] = point;
             seen = light_without_rays(point);
         } else
@@ -126,6 +135,8 @@ void write_cap(uint band_pixel, vec2 pixel, CutSpan span, CapState cap)
         result.rgba = float[4](seen.x, seen.y, seen.z, 1.0f);
     }
     pixels[band_pixel] = result;
+    if (has_feature(kFeatureMirrors))
+        paths[band_pixel].mirror = 0.0f;
     if (has_feature(kFeatureEdges))
         edges[band_pixel] = uvec2(0u);
 }

@@ -8,12 +8,12 @@ struct Ray {
     vec3 across; // w - w0, world
 };
 
-float cut_begin = 0.0f; // where section planes let the ray begin, with kFeatureCut
+float cut_begin = -kHuge; // where the ray begins on its way, with kFeatureCut or kFeatureLayers
 
-// `past` of the ray's begin: the eye, or a section plane
+// `past` of the ray's begin: the eye, a section plane, or behind a surface that lets light through
 float ray_begin()
 {
-    return has_feature(kFeatureCut) ? cut_begin : -view.tau_ref;
+    return has_feature(kFeatureCut | kFeatureLayers) ? max(cut_begin, -view.tau_ref) : -view.tau_ref;
 }
 
 // The ray's tau of a hit

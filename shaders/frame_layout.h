@@ -34,6 +34,7 @@ struct FrameView {
     uint line_classes; // bit kEdge...
     float start[2];    // with kFeatureStochastic: start_of_frame (runtime/stochastic_frames.h)
     uint alone;        // 1: each workgroup traces pixel retries[workgroup] of the band, with one of its invocations
+    // of primary.comp and blend.comp: the layer's number; of mirror.comp: the reflection's;
     // of light.comp: what is gathered, a light's number or kGatherSky, and samples [first_sample, end_sample) of it; of
     // caps.comp: the question's number
     uint gathered;
@@ -150,8 +151,13 @@ TRIMRAY_CONST uint kFeatureReuse = 256u;     // RenderOptions::reuse_last
 
 TRIMRAY_CONST uint kFeatureLights = 512u; // SceneLook's lights: the pixels' LitPixels are kept
 TRIMRAY_CONST uint kFeatureCut = 1024u;   // SceneLook's section planes
+TRIMRAY_CONST uint kFeatureMaterials = 2048u;
+TRIMRAY_CONST uint kFeatureLayers = 4096u; // some material lets light through
+TRIMRAY_CONST uint kFeatureMirrors = 8192u;
+TRIMRAY_CONST uint kFeatureEnvironment = 16384u;
 
-TRIMRAY_CONST uint kGatherSky = 0xffffffffu; // FrameView::gathered
+TRIMRAY_CONST uint kGatherSky = 0xffffffffu; // FrameView::gathered, of light.comp
+TRIMRAY_CONST uint kBlendAll = 0xffffffffu;  // ... of blend.comp: all layers are there
 
 TRIMRAY_CONST uint kGroupSide = 8u; // workgroups are 8 x 8 pixels
 
@@ -181,16 +187,17 @@ TRIMRAY_CONST uint kBindKept = 20u; // a KeptHit a pixel of the picture; of one 
 // a LastHit a pixel of the picture; of one element without kFeatureReuse
 TRIMRAY_CONST uint kBindLastHits = 21u; // the last picture's
 TRIMRAY_CONST uint kBindNextHits = 22u; // this one's, for the next
-// of nothing where no light, section or free ray asks for them
-TRIMRAY_CONST uint kBindPlaces = 23u;    // PlaceView, LightView, kMostLights LightRecords, samples (light_layout.h)
-TRIMRAY_CONST uint kBindToPart = 24u;    // a WorldToPart an instance
-TRIMRAY_CONST uint kBindLitPixels = 25u; // a LitPixel a pixel of the band
-TRIMRAY_CONST uint kBindStopped = 26u;   // pixels of the band to cast free rays from again: how many, and which
-TRIMRAY_CONST uint kBindSection = 27u;   // SectionView (section_layout.h)
-TRIMRAY_CONST uint kBindCaps = 28u;      // a CapState a pixel of the band
-TRIMRAY_CONST uint kBindMap = 29u;       // a MapView; none without a map
-TRIMRAY_CONST uint kBindMapValues = 30u; // a float a pixel of the band; none without a map that measures
-TRIMRAY_CONST uint kFrameBindings = 31u;
+// of nothing where the scene's look does not ask for them
+TRIMRAY_CONST uint kBindLook = 23u;        // LookFrame and light samples (look_layout.h)
+TRIMRAY_CONST uint kBindToPart = 24u;      // a WorldToPart an instance
+TRIMRAY_CONST uint kBindLitPixels = 25u;   // a LitPixel a pixel of the band
+TRIMRAY_CONST uint kBindStopped = 26u;     // pixels of the band to cast free rays from again: how many, and which
+TRIMRAY_CONST uint kBindCaps = 27u;        // a CapState a pixel of the band
+TRIMRAY_CONST uint kBindMapValues = 28u;   // a float a pixel of the band, where a map measures
+TRIMRAY_CONST uint kBindMaterials = 29u;   // MaterialHead and what it names (material_layout.h)
+TRIMRAY_CONST uint kBindEnvironment = 30u; // width, height, 3 floats a pixel
+TRIMRAY_CONST uint kBindPaths = 31u;       // a PathState a pixel of the band
+TRIMRAY_CONST uint kFrameBindings = 32u;   // what common drivers allow
 
 #ifdef __cplusplus
 static_assert(sizeof(FrameView) == 128); // what every device takes

@@ -9,6 +9,7 @@
 #include "format/kd_layout.h"
 #include "shaders/frame_layout.h"
 #include "shaders/light_layout.h"
+#include "shaders/material_layout.h"
 #include "shaders/section_layout.h"
 // first: the formulas fetch through it, and they make `scalar`, a layout there, a type
 #include "shaders/scene_buffers.glsl"
@@ -28,6 +29,7 @@
 #include "shaders/shared/trim_kd.h"
 #include "shaders/shared/trim_lookup.h"
 
+#include "shaders/materials.glsl"
 #include "shaders/ray_types.glsl"
 #include "shaders/free_rays.glsl"
 #include "shaders/leaf_hit.glsl"

@@ -17,12 +17,12 @@ bool needs_rays(LightRecord light)
     return (light.kind & kLightShadows) != 0u;
 }
 
-LitPixel lit_pixel(vec2 pixel, float past, vec3 normal, vec3 to_eye, vec3 color, float specular)
+// A hit at `place` where a pixel is `width` wide
+LitPixel lit_point(vec3 place, float width, vec3 normal, vec3 to_eye, MaterialRecord material)
 {
-    vec3 place = place_at(pixel, past);
     vec3 side = dot(normal, to_eye) < 0.0f ? -normal : normal;
     return LitPixel(float[3](place.x, place.y, place.z), float[3](side.x, side.y, side.z),
-                    float[3](to_eye.x, to_eye.y, to_eye.z), float[3](color.x, color.y, color.z), specular, place_width(past));
+                    float[3](to_eye.x, to_eye.y, to_eye.z), material.color, material.specular, width);
 }
 
 // Where the rays begin that leave it

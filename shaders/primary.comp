@@ -9,6 +9,7 @@
 #include "format/kd_layout.h"
 #include "shaders/frame_layout.h"
 #include "shaders/light_layout.h"
+#include "shaders/material_layout.h"
 #include "shaders/section_layout.h"
 // first: the formulas fetch through it, and they make `scalar`, a layout there, a type
 #include "shaders/scene_buffers.glsl"
@@ -17,6 +18,7 @@
 #include "shaders/shared/bezier_derivatives.h"
 #include "shaders/shared/bvh_node.h"
 #include "shaders/shared/edge.h"
+#include "shaders/shared/environment.h"
 #include "shaders/shared/language.h"
 #include "shaders/shared/leaf_box.h"
 #include "shaders/shared/leaf_proof.h"
@@ -32,6 +34,7 @@
 #include "shaders/shared/trim_kd.h"
 #include "shaders/shared/trim_lookup.h"
 
+#include "shaders/materials.glsl"
 #include "shaders/ray_types.glsl"
 #include "shaders/eye_rays.glsl"
 #include "shaders/leaf_hit.glsl"
@@ -39,7 +42,8 @@
 #include "shaders/last_hits.glsl"
 
 #include "shaders/border_edges.glsl"
-#include "shaders/colors.glsl"
+#include "shaders/normals.glsl"
+#include "shaders/environment.glsl"
 #include "shaders/places.glsl"
 #include "shaders/light.glsl"
 #include "shaders/section.glsl"
@@ -48,42 +52,16 @@
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
-// S_u x S_v of a Bezier patch; at a pole or along a degenerate side the one a little way inside
-vec3 bezier_normal(PatchRecord patch, vec2 uv)
+bool is_first_layer()
 {
-    const float kFlat = 1e-10f; // square of the sine, or of the ratio of lengths, that rounding leaves no digits
-    const float kInwards = 1.0f / 2048.0f;
-    uint degree_u = (patch.shape >> 8) & 0xffu;
-    uint degree_v = (patch.shape >> 16) & 0xffu;
-    bool rational = has_feature(kFeatureRational) && (patch.shape & kShapeRational) != 0u;
-    if (local_floats > 0u)
-        copy_control_points(patch, (degree_u + 1u) * (degree_v + 1u) * (rational ? 4u : 3u));
-    vec3 normal = vec3(0.0f);
-    bool flat_there = true;
-    for (int attempt = 0; attempt < 2 && flat_there; ++attempt) {
-        SurfacePoint s = bezier_point(patch.first_control_point, int(degree_u), int(degree_v), rational, uv);
-        normal = cross(s.du, s.dv);
-        float du2 = dot(s.du, s.du);
-        float dv2 = dot(s.dv, s.dv);
-        flat_there = dot(normal, normal) <= kFlat * du2 * dv2 || du2 <= kFlat * dv2 || dv2 <= kFlat * du2;
-        uv += (0.5f - uv) * kInwards;
-    }
-    return normal;
+    return !has_feature(kFeatureLayers) || view.gathered == 0u;
 }
 
-// The normal in the world, outward as the face's orientation says, of any length
-vec3 world_normal(Hit hit, FrameInstance instance, PatchRecord patch, FaceRecord face, Ray eye_ray)
+// Where the layer behind a hit may begin: rounding does not find the same hit again
+float begin_behind(vec2 pixel, float past)
 {
-    uint kind = patch.shape & 0xffu;
-    PatchRay ray = patch_ray(instance, hit.instance, patch, eye_ray);
-    vec3 p = ray.origin + hit.t * ray.direction;
-    vec3 n;
-    if (kind == kKindBezier && has_kind(kKindBezier))
-        n = bezier_normal(patch, clamp(hit.uv_patch, 0.0f, 1.0f)); // beyond a pole's side a patch is turned inside out
-    else
-        n = native_normal(kind, patch, p);
-    n = combine(vector(patch.axis_x), vector(patch.axis_y), vector(patch.axis_z), outward(patch, face, n));
-    return combine(vector(instance.normal_x), vector(instance.normal_y), vector(instance.normal_z), n);
+    float away = start_distance(place_at(pixel, past), place_width(past) * view.error_px);
+    return past + away / length(place_along(pixel));
 }
 
 FramePixel miss_pixel(bool doubt)
@@ -123,20 +101,27 @@ FramePixel hit_pixel(Hit hit, Ray eye_ray, uint band_pixel)
     MapColor map;
     if (mapped)
         map = map_hit(hit, instance, patch, face, eye_ray, normal, to_eye);
-    if (measures())
+    if (measures() && is_first_layer())
         map_values[band_pixel] = map.value;
     if (has_feature(kFeatureShade)) {
-        vec3 color = mapped ? map.color : face_color(face, instance);
+        MaterialRecord material = face_material(patch.face, face, hit.instance, instance);
+        if (mapped)
+            material.color = float[3](map.color.x, map.color.y, map.color.z);
+        vec3 color = vector(material.color);
         if (mapped && !is_lit_map(surface_map)) {
             if (has_feature(kFeatureLights))
                 lit_pixels[band_pixel].pixel = 0.0f;
         } else if (has_feature(kFeatureLights)) {
-            LitPixel point = lit_pixel(eye_ray.pixel, hit.past, normal, to_eye, color, kSpecular);
+            LitPixel point = lit_point(place_at(eye_ray.pixel, hit.past), place_width(hit.past), normal, to_eye, material);
             lit_pixels[band_pixel] = point;
             color = light_without_rays(point);
         } else
             color = shade(color, normal, to_eye);
-        result.rgba = float[4](color.x, color.y, color.z, 1.0f);
+        result.rgba = float[4](color.x, color.y, color.z, material.opacity);
+        if (has_feature(kFeatureMirrors))
+            paths[band_pixel].mirror = material.mirror;
+        if (has_feature(kFeatureLayers))
+            paths[band_pixel].begin = begin_behind(eye_ray.pixel, hit.past);
     }
     return result;
 }
@@ -155,7 +140,7 @@ void main()
         Ray eye_ray = Ray(pixel, pixel.x * vector(view.step_x) + pixel.y * vector(view.step_y));
         uint picture_pixel = (view.first_row + at.y) * view.width + at.x;
         Hit before = Hit(kHuge, 0.0f, vec2(0.0f), vec2(0.0f), 0xffffffffu, 0xffffffffu, kHuge, false, false, 0.0f);
-        if (has_feature(kFeatureKept))
+        if (has_feature(kFeatureKept) && is_first_layer())
             before = load_kept(picture_pixel);
         if (has_feature(kFeatureStochastic))
             before.doubt = -kHuge; // plain Newton claims nothing
@@ -164,9 +149,14 @@ void main()
             cut_begin = span.begin;
             before.past = span.begin < span.end ? min(before.past, span.end) : -kHuge;
         }
+        if (!is_first_layer()) {
+            cut_begin = paths[picture_pixel - view.first_row * view.width].begin;
+            if (cut_begin >= kHuge)
+                before.past = -kHuge;
+        }
         Guess guess = Guess(kNoLeaf, 0u);
         // where the loop limit bears on what is searched, alone, the picture must not hang on the last one
-        if (has_feature(kFeatureReuse) && view.alone == 0u)
+        if (has_feature(kFeatureReuse) && view.alone == 0u && is_first_layer())
             guess = guess_hit(uvec2(at.x, view.first_row + at.y), pixel);
         Hit hit;
         bool complete;
@@ -177,33 +167,41 @@ void main()
                 break;
             rims_cut = true;
         }
-        if (has_feature(kFeatureCut) && hit.leaf == kNoLeaf)
+        if (has_feature(kFeatureCut | kFeatureLayers) && hit.leaf == kNoLeaf)
             hit.past = kHuge;
-        if (has_feature(kFeatureKept)) {
+        if (has_feature(kFeatureKept) && is_first_layer()) {
             // a pixel changes only where its new hit is nearer than what was kept
             if (complete && hit.past < before.past)
                 store_kept(picture_pixel, hit);
             else
                 hit = before;
         }
-        if (has_feature(kFeatureReuse))
+        if (has_feature(kFeatureReuse) && is_first_layer())
             keep_hit(picture_pixel, hit, eye_ray.across);
         uint band_pixel = at.y * view.width + at.x;
         FramePixel result = miss_pixel(hit.doubt < kHuge);
         if (hit.past < kHuge)
             result = hit_pixel(hit, eye_ray, band_pixel);
-        else if (has_feature(kFeatureLights))
-            lit_pixels[band_pixel].pixel = 0.0f;
+        else {
+            if (has_feature(kFeatureLights))
+                lit_pixels[band_pixel].pixel = 0.0f;
+            if (has_feature(kFeatureLayers))
+                paths[band_pixel].begin = kHuge;
+            else if (has_feature(kFeatureEnvironment)) {
+                vec3 behind = environment_along(vector(view.w0) + eye_ray.across);
+                result.rgba = float[4](behind.x, behind.y, behind.z, 1.0f);
+            }
+        }
         if (measures() && hit.past >= kHuge)
             map_values[band_pixel] = 0.0f;
         if (!complete)
             result.status |= kPixelStopped;
-        if (has_feature(kFeatureEdges))
+        if (has_feature(kFeatureEdges) && is_first_layer())
             edges[band_pixel] = hit.past < kHuge ? find_edges(hit, eye_ray) : uvec2(0u);
         pixels[band_pixel] = result;
     }
     if (has_feature(kFeatureCount)) {
-        tally(kCountRays, active_here && view.alone == 0u ? 1u : 0u);
+        tally(kCountRays, active_here && view.alone == 0u && is_first_layer() ? 1u : 0u);
         tally(kCountNodes, node_visits);
         tally(kCountLeaves, leaf_visits);
         tally(kCountNewton, newton_steps);

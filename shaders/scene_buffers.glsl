@@ -22,9 +22,11 @@ layout(scalar, set = 0, binding = kBindKdFaces) readonly buffer KdFaces { KdFace
 layout(scalar, set = 0, binding = kBindKept) buffer KeptHits { KeptHit kept_hits[]; };
 layout(scalar, set = 0, binding = kBindLastHits) readonly buffer LastHits { LastHit last_hits[]; };
 layout(scalar, set = 0, binding = kBindNextHits) writeonly buffer NextHits { LastHit next_hits[]; };
-layout(scalar, set = 0, binding = kBindPlaces) readonly buffer Places
+layout(scalar, set = 0, binding = kBindLook) readonly buffer Look
 {
     PlaceView places;
+    SectionView section;
+    MapView map_view;
     LightView light_view;
     LightRecord light_records[kMostLights];
     vec2 light_samples[];
@@ -36,10 +38,16 @@ layout(scalar, set = 0, binding = kBindStopped) buffer Stopped
     uint stopped_count;
     uint stopped[];
 };
-layout(scalar, set = 0, binding = kBindSection) readonly buffer Section { SectionView section; };
 layout(scalar, set = 0, binding = kBindCaps) buffer Caps { CapState caps[]; };
-layout(scalar, set = 0, binding = kBindMap) readonly buffer Map { MapView map_view[]; };
 layout(scalar, set = 0, binding = kBindMapValues) writeonly buffer MapValues { float map_values[]; };
+layout(scalar, set = 0, binding = kBindMaterials) readonly buffer Materials { uint material_words[]; };
+layout(scalar, set = 0, binding = kBindEnvironment) readonly buffer EnvironmentMap
+{
+    uint environment_width;
+    uint environment_height;
+    float environment_rgb[];
+};
+layout(scalar, set = 0, binding = kBindPaths) buffer Paths { PathState paths[]; };
 layout(scalar, push_constant) uniform View { FrameView view; };
 
 // Specialised to what the pack holds and the frame asks for: what is false here costs no instruction.

@@ -98,5 +98,5 @@ MapColor map_hit(Hit hit, FrameInstance instance, PatchRecord patch, FaceRecord 
     }
     PixelSteps steps = PixelSteps(vector(view.step_x), vector(view.step_y));
     point.to_eye_steps = unit_steps(to_eye, steps, -1.0f / length(vector(view.w0) + eye_ray.across));
-    return map_color(surface_map, map_view[0], point);
+    return map_color(surface_map, map_view, point);
 }

@@ -65,8 +65,15 @@ struct Guess {
     uint instance;
 };
 
-// Whether any hit ends a walk
+// Whether any hit ends a walk; then what lets light through is no hit
 bool any_hit = false;
+
+bool lets_light_through(uint leaf, uint instance)
+{
+    if (!has_feature(kFeatureLayers) || !any_hit)
+        return false;
+    return material_of(patches[leaves[leaf].patch].face, instance).opacity < 1.0f;
+}
 
 // Walks the trees until nothing nearer can wait; the guess is searched before all others, and only then. Returns false
 // where the driver's loop limit would have cut it short.
@@ -109,7 +116,7 @@ bool walk(Ray whole_ray, Guess guess, inout Hit hit)
             } else {
                 uint leaf = instance.first_leaf + index;
                 bool is_guess = has_feature(kFeatureReuse) && leaf == guess.leaf && instance_index == guess.instance;
-                if (!is_guess || guess_waits)
+                if ((!is_guess || guess_waits) && !lets_light_through(leaf, instance_index))
                     leaf_hit(leaf, instance_index, instance, whole_ray, hit);
                 guess_waits = false;
                 if (any_hit && hit.leaf != kNoLeaf)
