@@ -140,6 +140,7 @@ private:
         }
         caps.color = real3(load(red), load(green), load(blue));
         caps.instance = select(lanes_of(inside), load(instances), integer(~0u));
+        const real width = places_.footprint(caps.past);
         const mask odd = (caps.instance & integer(1u)) != integer(0u);
         for (uint i = 0; i < section_.count; ++i) {
             const SectionPlaneView& plane = section_.planes[i];
@@ -155,8 +156,8 @@ private:
             if (section_.caps != kCapsHatched)
                 continue;
             const real slant = max(abs(dot(normal, to_eye)), real(0.05f));
-            const real hatch = hatch_at(u * (1 / section_.hatch), v * (1 / section_.hatch), odd,
-                                        real(rays.footprint / section_.hatch) / slant);
+            const real hatch =
+                hatch_at(u * (1 / section_.hatch), v * (1 / section_.hatch), odd, width * (1 / section_.hatch) / slant);
             caps.color = select(here, caps.color * (1.0f - kHatchDarkens * hatch), caps.color);
         }
     }

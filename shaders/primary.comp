@@ -120,8 +120,6 @@ FramePixel hit_pixel(Hit hit, Ray eye_ray, uint band_pixel)
         result.rgba = float[4](color.x, color.y, color.z, material.opacity);
         if (has_feature(kFeatureMirrors))
             paths[band_pixel].mirror = material.mirror;
-        if (has_feature(kFeatureLayers))
-            paths[band_pixel].begin = begin_behind(eye_ray.pixel, hit.past);
     }
     return result;
 }
@@ -185,9 +183,7 @@ void main()
         else {
             if (has_feature(kFeatureLights))
                 lit_pixels[band_pixel].pixel = 0.0f;
-            if (has_feature(kFeatureLayers))
-                paths[band_pixel].begin = kHuge;
-            else if (has_feature(kFeatureEnvironment)) {
+            if (has_feature(kFeatureEnvironment) && !has_feature(kFeatureLayers)) {
                 vec3 behind = environment_along(vector(view.w0) + eye_ray.across);
                 result.rgba = float[4](behind.x, behind.y, behind.z, 1.0f);
             }
@@ -196,6 +192,8 @@ void main()
             map_values[band_pixel] = 0.0f;
         if (!complete)
             result.status |= kPixelStopped;
+        else if (has_feature(kFeatureLayers)) // a pixel that is traced again begins where it did
+            paths[band_pixel].begin = hit.past < kHuge ? begin_behind(pixel, hit.past) : kHuge;
         if (has_feature(kFeatureEdges) && is_first_layer())
             edges[band_pixel] = hit.past < kHuge ? find_edges(hit, eye_ray) : uvec2(0u);
         pixels[band_pixel] = result;

@@ -55,7 +55,9 @@ FN real hatch_at(real x, real y, mask other_way, real width)
     real off = abs(along - floor(along) - 0.5f); // from the middle between two lines
     real edge = (off - 0.4f) / max(width, real(1e-6f)) + 0.5f;
     real line = clamp(edge, real(0.0f), real(1.0f));
-    return select(width > 0.5f, real(0.2f), line); // far away: as dark as lines are on average
+    // lines that are too close to be told apart are as dark as they are on average
+    real blurred = clamp(4.0f * width - 1.0f, real(0.0f), real(1.0f));
+    return line + (0.2f - line) * blurred;
 }
 
 SHARED_CLOSE
