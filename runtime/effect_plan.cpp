@@ -275,6 +275,7 @@ EffectPlan effect_plan(const PackFacts& facts, const RenderOptions& options, Dev
     plan.trim = options.trim == TrimMode::Auto ? TrimMode::Exact : options.trim;
     plan.shade = options.shade;
     plan.edges = has_effects(options) && edge_query(options).any();
+    plan.parallel = options.camera.orthographic_mm > 0;
     plan.lit = options.shade && has_lights(options.look);
     plan.stochastic = options.closest == ClosestPolicy::Stochastic;
     plan.keeps_hits = keeps_hits(options);

@@ -46,8 +46,8 @@ const uint32_t kCapsSpirv[] =
 // Bounds the memory of a band and the time of a dispatch, which some drivers end after a second or two
 constexpr size_t kBandBytes = size_t{32} << 20;
 
-constexpr uint32_t kLookDone =
-    kLookLights | kLookShadows | kLookSoftShadows | kLookOcclusion | kLookMap | kLookSection | kLookCaps;
+constexpr uint32_t kLookDone = kLookLights | kLookShadows | kLookSoftShadows | kLookOcclusion | kLookMap |
+                               kLookSection | kLookCaps | kLookOrthographic;
 
 // Pixels whose subgroup reached that limit are traced again, one by one, in dispatches of so many
 constexpr uint32_t kMostRetries = 4096;
@@ -312,7 +312,7 @@ Status VulkanTracer::prepare_look(const RenderOptions& options, const FrameSetup
     if (!lit && !cut)
         return Done{};
     const PackImage& image = scene_->pack.image;
-    const ViewRays rays{setup.eye, setup.w0, setup.step_x, setup.step_y, setup.view.tau_ref};
+    const ViewRays rays{setup.eye, setup.w0, setup.step_x, setup.step_y, setup.tau_ref};
     if (lit)
         lights_ = frame_lights(image, options);
     const PlaceView places = place_view(image, rays);

@@ -150,6 +150,8 @@ TRIMRAY_CONST uint kFeatureReuse = 256u;     // RenderOptions::reuse_last
 
 TRIMRAY_CONST uint kFeatureLights = 512u; // SceneLook's lights: the pixels' LitPixels are kept
 TRIMRAY_CONST uint kFeatureCut = 1024u;   // SceneLook's section planes
+// Camera::orthographic_mm: pixel (x, y) looks along w0 from eye + dx step_x + dy step_y, steps in mm
+TRIMRAY_CONST uint kFeatureParallel = 2048u;
 
 TRIMRAY_CONST uint kGatherSky = 0xffffffffu; // FrameView::gathered
 

@@ -105,7 +105,7 @@ FramePixel hit_pixel(Hit hit, Ray eye_ray, uint band_pixel)
     LeafRecord leaf = leaves[hit.leaf];
     PatchRecord patch = patches[leaf.patch];
     FaceRecord face = faces[patch.face];
-    vec3 direction = vector(view.w0) + eye_ray.across;
+    vec3 direction = vector(view.w0) + turned(eye_ray.across);
     float stretch = length(direction);
     vec3 to_eye = direction / -stretch;
     vec3 normal = world_normal(hit, instance, patch, face, eye_ray);
