@@ -181,7 +181,7 @@ void add_look(uint32_t look, const SceneLook& scene, std::vector<EffectItem>& it
         items.push_back({"materials", fmt::format("asked for: {}", counted(scene.materials.size(), "rule", "rules"))});
     if ((look & kLookTransparency) != 0)
         items.push_back({"transparency",
-                         scene.xray
+                         scene.xray.value_or(1) < 1
                              ? fmt::format("asked for: opacity {} of all that no rule names", *scene.xray)
                              : fmt::format("{} opacity below 1", counted(count_if(scene.materials, lets_light_through),
                                                                          "rule gives an", "rules give an"))});
