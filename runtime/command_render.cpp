@@ -132,6 +132,8 @@ Result<std::vector<PictureJob>> plan_pictures(const RenderArguments& arguments, 
 /// Tells of rules that give nothing to anything.
 void note_unmatched_rules(const PackImage& image, const SceneRequest& request)
 {
+    if (request.look.materials.empty())
+        return;
     const Result<MaterialTable> table = resolve_materials(image, request.look);
     if (!table.ok()) // the tracers say so
         return;

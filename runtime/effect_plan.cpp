@@ -182,7 +182,7 @@ void add_look(uint32_t look, const SceneLook& scene, std::vector<EffectItem>& it
         items.push_back({"materials", fmt::format("asked for: {}", counted(scene.materials.size(), "rule", "rules"))});
     if ((look & kLookTransparency) != 0)
         items.push_back({"transparency",
-                         scene.xray
+                         scene.xray.value_or(1) < 1
                              ? fmt::format("asked for: opacity {} of all that no rule names", *scene.xray)
                              : fmt::format("{} opacity below 1", counted(count_if(scene.materials, lets_light_through),
                                                                          "rule gives an", "rules give an"))});
@@ -276,6 +276,7 @@ EffectPlan effect_plan(const PackFacts& facts, const RenderOptions& options, Dev
     plan.trim = options.trim == TrimMode::Auto ? TrimMode::Exact : options.trim;
     plan.shade = options.shade;
     plan.edges = has_effects(options) && edge_query(options).any();
+    plan.parallel = options.camera.orthographic_mm > 0;
     plan.lit = options.shade && has_lights(options.look);
     plan.stochastic = options.closest == ClosestPolicy::Stochastic;
     plan.keeps_hits = keeps_hits(options);

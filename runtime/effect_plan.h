@@ -52,9 +52,10 @@ struct EffectPlan {
     bool rational = false, trims = false, rims = false;
     TrimMode trim = TrimMode::Exact; // not auto
     bool shade = false;
-    bool edges = false; // borders are measured beside hits
-    bool lit = false;   // lights and the sky are gathered for each pixel (runtime/light_view.h)
-    bool cut = false;   // rays begin and end at section planes
+    bool edges = false;    // borders are measured beside hits
+    bool parallel = false; // rays do not meet at an eye
+    bool lit = false;      // lights and the sky are gathered for each pixel (runtime/light_view.h)
+    bool cut = false;      // rays begin and end at section planes
     bool materials = false, layers = false, mirrors = false, environment = false;
     bool stochastic = false, keeps_hits = false, reuses_hits = false;
     SurfaceMap map = SurfaceMap::None; // none also where it would not be seen

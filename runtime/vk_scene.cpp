@@ -119,8 +119,9 @@ Specialisation specialisation(const EffectPlan& plan, bool count)
           std::pair{plan.edges, kFeatureEdges}, std::pair{plan.stochastic, kFeatureStochastic},
           std::pair{plan.keeps_hits, kFeatureKept}, std::pair{plan.reuses_hits, kFeatureReuse},
           std::pair{plan.lit, kFeatureLights}, std::pair{plan.cut, kFeatureCut},
-          std::pair{plan.materials, kFeatureMaterials}, std::pair{plan.layers, kFeatureLayers},
-          std::pair{plan.mirrors, kFeatureMirrors}, std::pair{plan.environment, kFeatureEnvironment}})
+          std::pair{plan.parallel, kFeatureParallel}, std::pair{plan.materials, kFeatureMaterials},
+          std::pair{plan.layers, kFeatureLayers}, std::pair{plan.mirrors, kFeatureMirrors},
+          std::pair{plan.environment, kFeatureEnvironment}})
         features |= wanted ? feature : 0u;
     Specialisation constants{};
     constants[kSpecTrimMode] = plan.trim == TrimMode::Sdf      ? kTrimByTexture
@@ -186,16 +187,21 @@ Result<FrameSetup> frame_setup(const CpuScene& scene, const RenderOptions& optio
     setup.w0 = through_middle * per_length;
     setup.step_x = rays.step_x * per_length;
     setup.step_y = rays.step_y * per_length;
+    // what the device takes: of parallel rays the steps between them, from their own plane
+    const bool parallel = options.camera.orthographic_mm > 0;
+    const Vec3 eye_mm = options.camera.eye;
+    const Vec3 view_x = setup.step_x * (parallel ? rays.plane_mm : 1.0);
+    const Vec3 view_y = setup.step_y * (parallel ? rays.plane_mm : 1.0);
 
     FrameView& view = setup.view;
     const Vec3 world_origin = std::to_array(image.world_origin_mm);
-    const double top_tau = dot(world_origin - rays.eye, setup.w0);
-    store((rays.eye + setup.w0 * top_tau - world_origin) * (1.0 / image.world_scale_mm), view.top_origin);
+    const double top_tau = dot(world_origin - eye_mm, setup.w0);
+    store((eye_mm + setup.w0 * top_tau - world_origin) * (1.0 / image.world_scale_mm), view.top_origin);
     view.top_tau = static_cast<float>(top_tau);
     view.per_world_scale = static_cast<float>(1.0 / image.world_scale_mm);
     store(setup.w0, view.w0);
-    store(setup.step_x, view.step_x);
-    store(setup.step_y, view.step_y);
+    store(view_x, view.step_x);
+    store(view_y, view.step_y);
     view.middle[0] = static_cast<float>(middle[0]);
     view.middle[1] = static_cast<float>(middle[1]);
     view.width = options.width;
@@ -206,9 +212,10 @@ Result<FrameSetup> frame_setup(const CpuScene& scene, const RenderOptions& optio
     view.line_reach_px = query.line_reach_px;
     view.border_reach_px = query.border_reach_px;
     view.line_classes = query.line_classes;
-    view.tau_ref = nearest_tau(image, rays.eye, setup.w0);
+    view.tau_ref = nearest_tau(image, eye_mm, setup.w0);
+    setup.tau_ref = rays.plane_mm + static_cast<double>(view.tau_ref);
 
-    const std::vector<uint8_t> outside = seen_from_outside(scene, rays.eye);
+    const std::vector<uint8_t> outside = seen_from_outside(scene, eye_mm);
     setup.instances.resize(std::max<size_t>(image.instances.size(), 1));
     for (size_t i = 0; i < image.instances.size(); ++i) {
         const InstanceRecord& record = image.instances[i];
@@ -224,10 +231,10 @@ Result<FrameSetup> frame_setup(const CpuScene& scene, const RenderOptions& optio
                               cross(column[2], column[0]) * (1.0 / determinant),
                               cross(column[0], column[1]) * (1.0 / determinant)}};
         const double per_scale = 1.0 / part.scale_mm;
-        const Vec3 eye = (inverse(rays.eye - translation) - std::to_array(part.origin_mm)) * per_scale;
+        const Vec3 eye = (inverse(eye_mm - translation) - std::to_array(part.origin_mm)) * per_scale;
         const Vec3 w0 = inverse(setup.w0) * per_scale;
-        const Vec3 step_x = inverse(setup.step_x) * per_scale;
-        const Vec3 step_y = inverse(setup.step_y) * per_scale;
+        const Vec3 step_x = inverse(view_x) * per_scale;
+        const Vec3 step_y = inverse(view_y) * per_scale;
 
         FrameInstance& instance = setup.instances[i];
         store_pair(eye, instance.eye_hi, instance.eye_lo);

@@ -32,7 +32,9 @@ Status upload_kd(VulkanDevice& device, const KdTrims& kd, std::array<VulkanBuffe
 struct FrameSetup {
     FrameView view{};
     std::vector<FrameInstance> instances; // never empty: a scene without any gets one that nothing refers to
+    // As camera_rays has them, and the tau there that hits are kept relative to; mm
     std::array<double, 3> eye{}, w0{}, step_x{}, step_y{};
+    double tau_ref = 0;
 };
 /// Fails: InvalidPack (an instance whose transform has no inverse).
 Result<FrameSetup> frame_setup(const CpuScene& scene, const RenderOptions& options);

@@ -56,7 +56,7 @@ constexpr size_t kBandBytes = size_t{32} << 20;
 
 constexpr uint32_t kLookDone = kLookLights | kLookShadows | kLookSoftShadows | kLookOcclusion | kLookMap |
                                kLookSection | kLookCaps | kLookMaterials | kLookTransparency | kLookMirrors |
-                               kLookEnvironment;
+                               kLookEnvironment | kLookOrthographic;
 
 // Pixels whose subgroup reached that limit are traced again, one by one, in dispatches of so many
 constexpr uint32_t kMostRetries = 4096;
@@ -356,11 +356,11 @@ Status VulkanTracer::prepare_look(const RenderOptions& options, const EffectPlan
 {
     lights_ = {};
     const bool mapped = plan.map != SurfaceMap::None;
-    if (!plan.lit && !plan.cut && !plan.layers && !mapped)
+    if (!plan.lit && !plan.cut && !plan.layers && !plan.environment && !mapped)
         return Done{};
     const PackImage& image = scene_->pack.image;
     const SceneLook& scene_look = options.look;
-    const ViewRays rays{setup.eye, setup.w0, setup.step_x, setup.step_y, setup.view.tau_ref};
+    const ViewRays rays{setup.eye, setup.w0, setup.step_x, setup.step_y, setup.tau_ref};
     LookFrame look{};
     look.places = place_view(image, rays);
     if (plan.cut)

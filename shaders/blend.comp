@@ -14,6 +14,7 @@
 #include "shaders/shared/language.h"
 
 #include "shaders/environment.glsl"
+#include "shaders/places.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
@@ -45,7 +46,7 @@ void finish(uint band_pixel, vec2 pixel)
     float alpha = 1.0f - path.left;
     vec3 sum = vector(path.layers);
     if (has_feature(kFeatureEnvironment)) {
-        sum += path.left * environment_along(vector(view.w0) + pixel.x * vector(view.step_x) + pixel.y * vector(view.step_y));
+        sum += path.left * environment_along(place_along(pixel));
         alpha = 1.0f;
     }
     vec3 color = alpha > 0.0f ? sum / alpha : vec3(0.0f);

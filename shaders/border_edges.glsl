@@ -66,7 +66,7 @@ Measured measured_hit(Hit hit, FrameInstance instance, PatchRecord patch, Ray ey
     vec3 axis_z = vector(patch.axis_z);
     vec3 step_x = project(axis_x, axis_y, axis_z, vector(instance.step_x)) * per_scale;
     vec3 step_y = project(axis_x, axis_y, axis_z, vector(instance.step_y)) * per_scale;
-    m.rows = pixel_rows(ray.direction, step_x, step_y, ray.anchor + hit.t);
+    m.rows = pixel_rows(ray.direction, step_x, step_y, spread(ray.anchor + hit.t));
     vec2 uv_scale = vec2(patch.uv_scale[0], patch.uv_scale[1]);
     m.native = plane_derivatives();
     if (m.kind == kKindBezier && has_kind(kKindBezier)) {

@@ -108,7 +108,9 @@ void write_cap(uint band_pixel, vec2 pixel, CutSpan span, CapState cap)
     }
     SectionPlaneView plane = section.planes[span.plane];
     vec3 place = place_at(pixel, span.begin);
-    vec3 direction = vector(view.w0) + pixel.x * vector(view.step_x) + pixel.y * vector(view.step_y);
+    vec3 direction = vector(view.w0);
+    if (!has_feature(kFeatureParallel))
+        direction += pixel.x * vector(view.step_x) + pixel.y * vector(view.step_y);
     float stretch = length(direction);
     vec3 to_eye = direction / -stretch;
     vec3 normal = vector(plane.normal);

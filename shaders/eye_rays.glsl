@@ -5,8 +5,20 @@ const bool kRaysCertify = true;
 
 struct Ray {
     vec2 pixel;  // from the picture's middle
-    vec3 across; // w - w0, world
+    vec3 across; // w - w0, world; of parallel rays mm to the side
 };
+
+// How far pixels' rays have spread at `tau`, per pixel in units of the steps: from the eye in proportion; parallel rays
+// are as far apart everywhere
+float spread(float tau)
+{
+    return has_feature(kFeatureParallel) ? 1.0f : tau;
+}
+// What a pixel's direction has of `across`
+vec3 turned(vec3 across)
+{
+    return has_feature(kFeatureParallel) ? vec3(0.0f) : across;
+}
 
 float cut_begin = -kHuge; // where the ray begins on its way, with kFeatureCut or kFeatureLayers
 
@@ -27,8 +39,8 @@ TreeRay top_ray(Ray eye_ray)
     vec3 across = eye_ray.across;
     TreeRay ray;
     ray.anchor = view.top_tau;
-    ray.origin = vector(view.top_origin) + view.top_tau * view.per_world_scale * across;
-    vec3 direction = (vector(view.w0) + across) * view.per_world_scale;
+    ray.origin = vector(view.top_origin) + spread(view.top_tau) * view.per_world_scale * across;
+    vec3 direction = (vector(view.w0) + turned(across)) * view.per_world_scale;
     ray.inverse = vec3(safe_inverse(direction.x), safe_inverse(direction.y), safe_inverse(direction.z));
     return ray;
 }
@@ -38,8 +50,8 @@ TreeRay part_ray(FrameInstance instance, uint, Ray eye_ray)
     vec3 across = eye_ray.pixel.x * vector(instance.step_x) + eye_ray.pixel.y * vector(instance.step_y);
     TreeRay ray;
     ray.anchor = instance.node_tau;
-    ray.origin = vector(instance.node_origin) + instance.node_tau * across;
-    vec3 direction = vector(instance.w0_hi) + across;
+    ray.origin = vector(instance.node_origin) + spread(instance.node_tau) * across;
+    vec3 direction = vector(instance.w0_hi) + turned(across);
     ray.inverse = vec3(safe_inverse(direction.x), safe_inverse(direction.y), safe_inverse(direction.z));
     return ray;
 }
@@ -62,12 +74,12 @@ PatchRay patch_ray(FrameInstance instance, uint, PatchRecord patch, Ray eye_ray)
     vec3 axis_x = vector(patch.axis_x);
     vec3 axis_y = vector(patch.axis_y);
     vec3 axis_z = vector(patch.axis_z);
-    ray.origin = project(axis_x, axis_y, axis_z, middle + ray.anchor * across) * per_scale;
-    ray.direction = project(axis_x, axis_y, axis_z, w0 + across) * per_scale;
+    ray.origin = project(axis_x, axis_y, axis_z, middle + spread(ray.anchor) * across) * per_scale;
+    ray.direction = project(axis_x, axis_y, axis_z, w0 + turned(across)) * per_scale;
     ray.past = ray.anchor - view.tau_ref;
     // the patch's own arithmetic, |q| about 1, and one rounding of `past`
     ray.slack = 4e-7f * (1.0f + length(middle) * per_scale) / length(ray.direction) + 1.2e-7f * abs(ray.past);
     ray.pixel = instance.footprint * per_scale;
-    ray.width = ray.pixel * abs(ray.anchor);
+    ray.width = ray.pixel * abs(spread(ray.anchor));
     return ray;
 }

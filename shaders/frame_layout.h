@@ -155,6 +155,8 @@ TRIMRAY_CONST uint kFeatureMaterials = 2048u;
 TRIMRAY_CONST uint kFeatureLayers = 4096u; // some material lets light through
 TRIMRAY_CONST uint kFeatureMirrors = 8192u;
 TRIMRAY_CONST uint kFeatureEnvironment = 16384u;
+// Camera::orthographic_mm: pixel (x, y) looks along w0 from eye + dx step_x + dy step_y, steps in mm
+TRIMRAY_CONST uint kFeatureParallel = 32768u;
 
 TRIMRAY_CONST uint kGatherSky = 0xffffffffu; // FrameView::gathered, of light.comp
 TRIMRAY_CONST uint kBlendAll = 0xffffffffu;  // ... of blend.comp: all layers are there

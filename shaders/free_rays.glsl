@@ -16,6 +16,10 @@ float tau_of(float past)
 {
     return past;
 }
+float spread(float tau)
+{
+    return tau;
+}
 
 TreeRay tree_ray(vec3 origin, vec3 direction)
 {

@@ -12,7 +12,7 @@ Guess guess_hit(uvec2 at, vec2 pixel)
     vec3 step_x = vector(view.step_x);
     vec3 step_y = vector(view.step_y);
     float tau = max(view.top_tau + dot(off, vector(view.w0)), 0.0f); // w0, step_x, step_y are at right angles
-    vec2 now = vec2(dot(off, step_x) / dot(step_x, step_x), dot(off, step_y) / dot(step_y, step_y)) / tau;
+    vec2 now = vec2(dot(off, step_x) / dot(step_x, step_x), dot(off, step_y) / dot(step_y, step_y)) / spread(tau);
     vec2 size = vec2(float(view.width), float(view.height));
     vec2 from = clamp(2.0f * pixel - now + vec2(view.middle[0], view.middle[1]), vec2(0.0f), size);
     // a conversion may give anything where tau was 0
@@ -25,7 +25,7 @@ void keep_hit(uint picture_pixel, Hit hit, vec3 across)
 {
     float tau = view.tau_ref + hit.past;
     vec3 point =
-        vector(view.top_origin) + ((tau - view.top_tau) * vector(view.w0) + tau * across) * view.per_world_scale;
+        vector(view.top_origin) + ((tau - view.top_tau) * vector(view.w0) + spread(tau) * across) * view.per_world_scale;
     next_hits[picture_pixel] =
         LastHit(float[3](point.x, point.y, point.z), hit.past < kHuge ? hit.leaf : kNoLeaf, hit.instance);
 }

@@ -360,7 +360,7 @@ void offer_end(PatchRay ray, PatchRecord patch, FaceRecord face, NewtonPatch new
     bool on_patch = max(off.x, off.y) <= 0.5f;
     vec2 uv_face = face_uv(patch, kKindBezier, root.uv);
     vec2 uv_blur = vec2(0.0f);
-    float footprint = ray.pixel * (ray.anchor + root.t);
+    float footprint = ray.pixel * spread(ray.anchor + root.t);
     float off_by = kRaysCertify ? more_than_hair(footprint, newton.rounding) : 0.0f;
     // where weights may not stay positive beyond a side, it is not certain that the patch goes on
     bool unsure = on_patch && newton.rational && is_beyond_sides(root.uv);

@@ -83,7 +83,7 @@ FramePixel hit_pixel(Hit hit, Ray eye_ray, uint band_pixel)
     LeafRecord leaf = leaves[hit.leaf];
     PatchRecord patch = patches[leaf.patch];
     FaceRecord face = faces[patch.face];
-    vec3 direction = vector(view.w0) + eye_ray.across;
+    vec3 direction = vector(view.w0) + turned(eye_ray.across);
     float stretch = length(direction);
     vec3 to_eye = direction / -stretch;
     vec3 normal = world_normal(hit, instance, patch, face, eye_ray);
@@ -184,7 +184,7 @@ void main()
             if (has_feature(kFeatureLights))
                 lit_pixels[band_pixel].pixel = 0.0f;
             if (has_feature(kFeatureEnvironment) && !has_feature(kFeatureLayers)) {
-                vec3 behind = environment_along(vector(view.w0) + eye_ray.across);
+                vec3 behind = environment_along(place_along(pixel));
                 result.rgba = float[4](behind.x, behind.y, behind.z, 1.0f);
             }
         }

@@ -93,10 +93,12 @@ MapColor map_hit(Hit hit, FrameInstance instance, PatchRecord patch, FaceRecord 
         vec3 axis_z = vector(patch.axis_z);
         vec3 step_x = project(axis_x, axis_y, axis_z, vector(instance.step_x)) * per_scale;
         vec3 step_y = project(axis_x, axis_y, axis_z, vector(instance.step_y)) * per_scale;
-        PixelRows rows = pixel_rows(ray.direction, step_x, step_y, ray.anchor + hit.t);
+        PixelRows rows = pixel_rows(ray.direction, step_x, step_y, spread(ray.anchor + hit.t));
         point.normal_steps = world_normal_steps(patch, instance, s, rows, normal);
     }
     PixelSteps steps = PixelSteps(vector(view.step_x), vector(view.step_y));
-    point.to_eye_steps = unit_steps(to_eye, steps, -1.0f / length(vector(view.w0) + eye_ray.across));
+    point.to_eye_steps = PixelSteps(vec3(0.0f), vec3(0.0f));
+    if (!has_feature(kFeatureParallel))
+        point.to_eye_steps = unit_steps(to_eye, steps, -1.0f / length(vector(view.w0) + eye_ray.across));
     return map_color(surface_map, map_view, point);
 }

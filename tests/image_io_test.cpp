@@ -182,6 +182,48 @@ TEST_F(ImageIo, refuses_other_endings_and_folders_that_are_not_there)
     EXPECT_EQ(exit_code(nowhere.error()), kExitIo);
 }
 
+/// Written by OpenImageIO: 3 x 2 pixels of so many channels, counted up from `first` in steps of 1/4.
+void write_picture(const std::string& path, int channels, float first)
+{
+    const OIIO::ImageSpec spec(3, 2, channels, OIIO::TypeDesc::FLOAT);
+    std::vector<float> pixels;
+    for (int i = 0; i < 6 * channels; ++i)
+        pixels.push_back(first + 0.25f * float(i));
+    const auto out = OIIO::ImageOutput::create(path);
+    ASSERT_TRUE(out && out->open(path, spec) && out->write_image(OIIO::TypeDesc::FLOAT, pixels.data()) && out->close());
+}
+
+TEST_F(ImageIo, pictures_all_around_are_read_as_linear_light)
+{
+    write_picture(path("rgb.exr"), 3, 1);
+    Result<Environment> picture = read_environment(path("rgb.exr"));
+    ASSERT_TRUE(picture.ok()) << picture.error().detail;
+    EXPECT_EQ(picture->width, 3u);
+    EXPECT_EQ(picture->height, 2u);
+    ASSERT_EQ(picture->rgb.size(), 18u);
+    EXPECT_EQ(picture->rgb[0], 1.0f);
+    EXPECT_EQ(picture->rgb[17], 1 + 0.25f * 17);
+    write_picture(path("rgba.exr"), 4, 1);
+    picture = read_environment(path("rgba.exr"));
+    ASSERT_TRUE(picture.ok()) << picture.error().detail;
+    EXPECT_EQ(picture->rgb[3], 2.0f) << "the second pixel's red";
+    write_picture(path("grey.exr"), 1, 1);
+    picture = read_environment(path("grey.exr"));
+    ASSERT_TRUE(picture.ok()) << picture.error().detail;
+    EXPECT_EQ(picture->rgb[3], picture->rgb[5]);
+    write_picture(path("sky.hdr"), 3, 1);
+    picture = read_environment(path("sky.hdr"));
+    ASSERT_TRUE(picture.ok()) << picture.error().detail;
+    EXPECT_NEAR(picture->rgb[17], 1 + 0.25f * 17, 0.05f) << "8 bits and an exponent";
+
+    write_picture(path("negative.exr"), 3, -0.1f);
+    EXPECT_THAT(read_environment(path("negative.exr")).error().detail, testing::HasSubstr("pixel (0, 0)"));
+    std::ofstream(path("cut.exr"), std::ios::binary) << "v/1\x01";
+    EXPECT_EQ(read_environment(path("cut.exr")).error().code, ErrorCode::InvalidScene);
+    EXPECT_EQ(read_environment(path("none.exr")).error().code, ErrorCode::FileNotFound);
+    EXPECT_EQ(read_environment(path("sky.png")).error().code, ErrorCode::UnsupportedFormat);
+}
+
 TEST(box_filter, keeps_the_mean_light_and_the_covered_area)
 {
     // black and white in halves: half the light, which is sRGB 188; a fourth of the area covered: alpha 64

@@ -42,7 +42,7 @@ def main():
         expect((Path(folder) / "a.png").read_bytes().startswith(b"\x89PNG"), "the installed program writes a picture")
 
         headers = sorted(path.name for path in (prefix / "include" / "trimray" / "runtime").iterdir())
-        expect(headers == ["camera.h", "image_io.h", "tracer.h"], f"public headers, found {headers}")
+        expect(headers == ["camera.h", "image_io.h", "scene_look.h", "tracer.h"], f"public headers, found {headers}")
         run(options.cmake, "-S", EXAMPLE, "-B", example, "-G", "Ninja", f"-DCMAKE_PREFIX_PATH={prefix}",
             "-DCMAKE_BUILD_TYPE=Release")
         run(options.cmake, "--build", example)

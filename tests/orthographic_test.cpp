@@ -2,6 +2,7 @@
 // back.
 #include "runtime/camera.h"
 #include "tests/against_reference.h"
+#include "tests/keep_vulkan_loaded.h"
 #include "tests/traced_scenes.h"
 
 #include <gtest/gtest.h>
@@ -25,15 +26,17 @@ Camera parallel_camera(std::array<double, 3> view, double height_mm, double back
     return camera;
 }
 
-Frame traced(const std::shared_ptr<const Scene>& scene, const Camera& camera, uint32_t width, uint32_t height)
+Frame traced(const std::shared_ptr<const Scene>& scene, const Camera& camera, uint32_t width, uint32_t height,
+             Tracer* tracer = nullptr)
 {
     RenderOptions options;
     options.camera = camera;
     options.width = width;
     options.height = height;
     RenderStats stats;
-    Result<Frame> frame = (*make_cpu_tracer(scene))->render(options, stats);
-    EXPECT_TRUE(frame.ok());
+    Result<Frame> frame =
+        tracer != nullptr ? tracer->render(options, stats) : (*make_cpu_tracer(scene))->render(options, stats);
+    EXPECT_TRUE(frame.ok()) << frame.error().detail;
     return std::move(*frame);
 }
 
@@ -56,6 +59,27 @@ TEST(orthographic, pictures_are_the_references)
             EXPECT_EQ(found.not_finite, 0u);
             // a model far larger than the picture has fewer digits left of a pixel
             EXPECT_LT(found.largest_depth_px, height_mm > 1 ? 1e-2 : 5e-2) << height_mm;
+        }
+}
+
+TEST(orthographic, pictures_through_vulkan_are_the_references)
+{
+    const std::shared_ptr<const Scene> scene = all_kinds().finish();
+    keep_vulkan_loaded();
+    const Result<std::unique_ptr<Tracer>> tracer = make_vulkan_tracer(scene, true, false);
+    if (!tracer.ok())
+        GTEST_SKIP() << tracer.error().detail;
+    const ClosestReference closest(scene->pack.image);
+    for (const std::array<double, 3>& view : {std::array<double, 3>{0, 0, -1}, {-1, 1, -1}, {0.3, 1, 0.2}})
+        for (const double back : {40.0, 0.0}) {
+            const Camera camera = parallel_camera(view, 24, back);
+            const Frame frame = traced(scene, camera, 160, 120, tracer->get());
+            const AgainstReference found = compare_with_reference(frame, camera, closest);
+            EXPECT_EQ(std::accumulate(found.faults.begin(), found.faults.end(), uint64_t{0}), 0u)
+                << view[0] << ' ' << view[1] << ' ' << view[2] << " from " << back << " mm";
+            EXPECT_EQ(found.certified_wrong, 0u);
+            EXPECT_EQ(found.not_finite, 0u);
+            EXPECT_LT(found.largest_depth_px, 1e-2);
         }
 }
 
