@@ -230,7 +230,7 @@ uint32_t look_bits(const RenderOptions& options)
     add(any(look.lights, is_soft), kLookSoftShadows);
     add(look.occlusion.samples > 0, kLookOcclusion);
     add(has_mirrors(look), kLookMirrors);
-    add(look.xray.value_or(1) < 1 || any(look.materials, lets_light_through), kLookTransparency);
+    add(has_transparency(look), kLookTransparency);
     add(any(look.materials, [](const MaterialRule& rule) { return rule.material.color || rule.material.specular; }),
         kLookMaterials);
     add(look.environment != nullptr, kLookEnvironment);

@@ -1,6 +1,7 @@
 #include "runtime/frame_effects.h"
 
 #include "runtime/edge_lines.h"
+#include "runtime/materials.h"
 #include "runtime/seen_pixels.h"
 
 #include <fmt/format.h>
@@ -475,7 +476,7 @@ EdgeQuery edge_query(const RenderOptions& options)
 bool own_halves_alone(const RenderOptions& options)
 {
     const EdgeQuery query = edge_query(options);
-    return query.line_reach_px > 0 && query.border_reach_px == 0 && options.fill;
+    return query.line_reach_px > 0 && query.border_reach_px == 0 && options.fill && !has_transparency(options.look);
 }
 
 bool has_effects(const RenderOptions& options)

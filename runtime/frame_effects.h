@@ -35,7 +35,7 @@ EdgeQuery edge_query(const RenderOptions& options);
 Status check_effects(const RenderOptions& options);
 
 /// Whether a tracer may draw a line's share of its own pixel as it traces it: where nothing else changes that pixel's
-/// colour before, so that the pass has only outlines left.
+/// colour before, so that the pass has only outlines left, and what is hit is opaque.
 bool own_halves_alone(const RenderOptions& options);
 
 /// Runs body(i) for i in [0, count), at once where threads allow.

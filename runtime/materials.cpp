@@ -140,6 +140,13 @@ std::vector<uint8_t> pairs_there(const PackImage& image, const MaterialTable& ta
 
 } // namespace
 
+bool has_transparency(const SceneLook& look)
+{
+    return look.xray.value_or(1) < 1 ||
+           std::any_of(look.materials.begin(), look.materials.end(),
+                       [](const MaterialRule& rule) { return rule.material.opacity.value_or(1) < 1; });
+}
+
 Result<MaterialTable> resolve_materials(const PackImage& image, const SceneLook& look)
 {
     MaterialTable table;

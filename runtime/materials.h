@@ -41,6 +41,9 @@ inline bool has_materials(const SceneLook& look)
     return !look.materials.empty() || look.xray;
 }
 
+/// Whether it says that light comes through something.
+bool has_transparency(const SceneLook& look);
+
 /// Source: docs of MaterialRule: a rule holds where all its conditions do; later rules win, field by field; x-ray is
 /// the opacity where no rule gives one. A pack colour is a face's own, else its placement's, else the default grey.
 /// Fails: InvalidScene (more than kMostMaterialClasses pairs of classes).
