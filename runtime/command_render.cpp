@@ -285,7 +285,12 @@ int run_render(const RenderArguments& arguments)
         report_note(note);
 
     options->camera = jobs->front().from;
-    const EffectPlan plan = effect_plan(pack_facts(image), *options, (*tracer)->device_kind());
+    const PackFacts facts = pack_facts(image);
+    const EffectPlan plan = effect_plan(facts, *options, (*tracer)->device_kind());
+    if ((plan.look & kLookCaps) != 0 && facts.open_parts > 0)
+        report_note(fmt::format("--caps: {} of {} parts are not closed; caps there are only where faces happen to "
+                                "enclose something",
+                                facts.open_parts, facts.parts));
     if (arguments.explain && !arguments.json)
         print_plan(plan);
     if (arguments.output.empty()) {

@@ -144,7 +144,15 @@ bool mirrors(const MaterialRule& rule)
     return rule.material.mirror.value_or(0) > 0;
 }
 
-void add_geometry(uint32_t look, const SceneLook& scene, std::vector<EffectItem>& items)
+std::string open_parts_note(const PackFacts& facts)
+{
+    if (facts.open_parts == 0)
+        return "";
+    return fmt::format("; {} of {} not closed, and caps there are only where faces happen to enclose something",
+                       facts.open_parts, counted(facts.parts, "part is", "parts are"));
+}
+
+void add_geometry(const PackFacts& facts, uint32_t look, const SceneLook& scene, std::vector<EffectItem>& items)
 {
     if ((look & kLookOrthographic) != 0)
         items.push_back({"orthographic", "asked for: parallel rays"});
@@ -153,8 +161,9 @@ void add_geometry(uint32_t look, const SceneLook& scene, std::vector<EffectItem>
                                                                          "plane cuts away what is before it",
                                                                          "planes cut away what is before them"))});
     if ((look & kLookCaps) != 0)
-        items.push_back({"caps", scene.section.caps == CapStyle::Hatched ? "asked for: cut solids are hatched"
-                                                                         : "asked for: cut solids are filled"});
+        items.push_back({"caps", fmt::format("asked for: cut solids are {}{}",
+                                             scene.section.caps == CapStyle::Hatched ? "hatched" : "filled",
+                                             open_parts_note(facts))});
 }
 
 void add_look(uint32_t look, const SceneLook& scene, std::vector<EffectItem>& items)
@@ -299,7 +308,7 @@ EffectPlan effect_plan(const PackFacts& facts, const RenderOptions& options, Dev
     add_surfaces(facts, items);
     add_faces(facts, plan.trim, items);
     add_search(facts, plan, items);
-    add_geometry(plan.look, options.look, items);
+    add_geometry(facts, plan.look, options.look, items);
     add_map(options, items);
     if (plan.shade) {
         items.push_back({"shading", "the picture is asked for, not hits alone"});

@@ -52,8 +52,26 @@ void add_patches(const PackImage& image, PackFacts& facts)
                      [](const DegreeCount& a, const DegreeCount& b) { return a.patches > b.patches; });
 }
 
+/// Whether a face ends where no other begins.
+bool has_free_border(const PackImage& image, const FaceRecord& face)
+{
+    if ((face.flags & kFaceNaturalBorder) != 0) {
+        for (uint side = 0; side < 4; ++side)
+            if ((face.border_classes >> 2 * side & 3u) == kEdgeFree)
+                return true;
+        return false;
+    }
+    const auto pieces = std::span(image.trim_pieces).subspan(face.first_piece, face.piece_count);
+    return std::any_of(pieces.begin(), pieces.end(),
+                       [](uint word) { return (word >> kPieceClassShift & 3u) == kEdgeFree; });
+}
+
 void add_faces(const PackImage& image, PackFacts& facts)
 {
+    std::vector<uint8_t> is_open(image.parts.size());
+    for (const FaceRecord& face : image.faces)
+        is_open[face.part] |= has_free_border(image, face) ? 1 : 0;
+    facts.open_parts = size_t(std::count(is_open.begin(), is_open.end(), uint8_t{1}));
     facts.faces = image.faces.size();
     for (const FaceRecord& face : image.faces) {
         const bool natural = (face.flags & kFaceNaturalBorder) != 0;

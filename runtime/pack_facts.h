@@ -23,6 +23,7 @@ struct PackFacts {
     std::vector<DegreeCount> degrees;                // most patches first, then by degree; polynomial before rational
     uint32_t largest_net_floats = 0;                 // of a Bezier patch's control points
 
+    size_t open_parts = 0; // parts with a face that ends where no other begins: they close no solid
     size_t parts = 0, faces = 0, trimmed_faces = 0, rim_faces = 0, colored_faces = 0;
     size_t instances = 0, mirrored_instances = 0, colored_instances = 0;
     std::array<size_t, kEdgeClassCount> edges{}; // pieces of trims and sides of natural borders, by kEdge...
