@@ -425,5 +425,101 @@ TEST_P(light, nothing_hides_what_bulges_out)
     }
 }
 
+// ---- both tracers, all instruction sets, any number of threads -----------------------------------------------------
+
+/// All kinds of faces over a floor, and a box.
+std::shared_ptr<const Scene> busy_scene()
+{
+    TracedScene scene = all_kinds();
+    add_rectangle(scene, {0, 0, -9}, {0, 1, 20}, {1, 1, 20});
+    add_box(scene, {-12, 8, -5}, {3, 4, 4});
+    return scene.finish();
+}
+
+struct Asked {
+    const char* name;
+    SceneLook look;
+};
+std::vector<Asked> looks()
+{
+    SceneLook hard;
+    hard.lights = {
+        {.direction = {1, 2, -3}, .shadows = true},
+        {.kind = LightKind::Point, .position_mm = {10, -10, 15}, .color = {0.6f, 0.5f, 0.2f}, .shadows = true}};
+    SceneLook soft = hard;
+    soft.lights[0].half_angle_deg = 4;
+    soft.lights[1].radius_mm = 2;
+    SceneLook hidden;
+    hidden.occlusion.samples = 16;
+    SceneLook cut = hard;
+    cut.lights.pop_back();
+    cut.section.planes = {{{-11, 8, -3}, {0.1, -0.2, 1}}, {{8, 0, 0}, {1, 0, 0.2}}};
+    cut.section.caps = CapStyle::Hatched;
+    SceneLook all = soft;
+    all.occlusion = {4, 12};
+    all.section = cut.section;
+    return {{"hard shadows", hard}, {"soft shadows", soft}, {"occlusion", hidden}, {"sections", cut}, {"all", all}};
+}
+
+TEST(light_of_tracers, every_instruction_set_and_number_of_threads_draws_the_same_bits)
+{
+    const auto scene = busy_scene();
+    for (const auto& [name, look] : looks()) {
+        RenderOptions options = overview(160, 90);
+        options.look = look;
+        options.threads = 4;
+        const Frame first = draw(scene, options).frame;
+        options.threads = 1;
+        for (const char* set : {"avx512", "avx2", "sse4"}) {
+            if (!make_cpu_tracer(scene, set).ok())
+                continue;
+            const Frame frame = draw(scene, options, set).frame;
+            EXPECT_TRUE(same_bits(first.rgba, frame.rgba)) << name << ", " << set;
+            EXPECT_TRUE(same_bits(first.face, frame.face)) << name << ", " << set;
+            EXPECT_TRUE(same_bits(first.depth_mm, frame.depth_mm)) << name << ", " << set;
+            EXPECT_TRUE(same_bits(first.certified, frame.certified)) << name << ", " << set;
+        }
+    }
+}
+
+TEST(light_of_tracers, both_tracers_agree)
+{
+    const auto scene = busy_scene();
+    for (const auto& [name, look] : looks()) {
+        RenderOptions options = overview(160, 90);
+        options.look = look;
+        const auto vulkan = drawn_by(true, scene, options);
+        if (!vulkan)
+            return;
+        const Frame cpu = draw(scene, options).frame;
+        const Frame& other = vulkan->frame;
+        const Disagreement d = compare(cpu, other, options);
+        double sum = 0, worst = 0;
+        int off = 0, hits = 0;
+        for (size_t i = 0; i < cpu.face.size(); ++i) {
+            if (cpu.face[i] != other.face[i] || cpu.face[i] == -1)
+                continue;
+            double most = 0;
+            for (size_t c = 0; c < 3; ++c)
+                most = std::max(most, std::abs(double(cpu.rgba[4 * i + c]) - double(other.rgba[4 * i + c])));
+            ++hits;
+            sum += most;
+            worst = std::max(worst, most);
+            off += most > 1e-3;
+        }
+        std::cout << fmt::format(
+            "{}: {} pixels, {} at borders and {} elsewhere have another face; {} differ by more than "
+            "1e-3, {:.2g} at most, {:.2g} in the mean\n",
+            name, hits, d.borders, d.strangers, off, worst, sum / hits);
+        EXPECT_GT(hits, 5000) << name;
+        EXPECT_EQ(d.strangers, 0) << name;
+        EXPECT_LE(d.borders, hits / 1000) << name;
+        EXPECT_LE(d.depth, 1e-6) << name;
+        EXPECT_LE(d.certified, hits / 1000) << name;
+        EXPECT_LE(off, hits / 1000) << name;
+        EXPECT_LE(sum / hits, 1e-4) << name;
+    }
+}
+
 } // namespace
 } // namespace trimray
