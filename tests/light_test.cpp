@@ -389,7 +389,7 @@ TEST_P(light, nothing_hides_what_bulges_out)
 {
     for (const Convex& body : convex_bodies()) {
         for (const Vec3& eye : {Vec3{18, -26, 19}, Vec3{2, -3, 40}, Vec3{-34, 9, 3}}) {
-            if (vulkan() && eye[2] > 20)
+            if (vulkan() && eye[0] != 18)
                 continue; // a picture by the software driver takes a second
             RenderOptions options;
             options.width = vulkan() ? 64 : 160;
