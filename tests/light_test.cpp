@@ -134,8 +134,7 @@ TEST_P(light, a_ball_throws_the_shadow_its_outline_bounds)
     expect_shadow(vulkan(), {.direction = {0.5, 0.3, -1}});
     expect_shadow(vulkan(), {.direction = {0.9, -0.4, -0.5}});
     expect_shadow(vulkan(), {.kind = LightKind::Point, .position_mm = {4, -3, 20}});
-    // the ball is beyond the light and hides nothing of it from most of the floor: shadows end at the light
-    expect_shadow(vulkan(), {.kind = LightKind::Point, .position_mm = {-5, 2, 7}});
+    expect_shadow(vulkan(), {.kind = LightKind::Point, .position_mm = {-5, 2, 7}}); // beside the ball
 }
 
 TEST_P(light, what_lies_beyond_a_point_light_throws_no_shadow)
@@ -388,9 +387,12 @@ std::vector<Convex> convex_bodies()
 TEST_P(light, nothing_hides_what_bulges_out)
 {
     for (const Convex& body : convex_bodies()) {
+        const bool is_ball_or_dome = body.scene->pack.image.faces.size() == 1 && body.least_rho == 0;
+        if (vulkan() && !is_ball_or_dome)
+            continue; // the software driver takes seconds for the shaders of each kind
         for (const Vec3& eye : {Vec3{18, -26, 19}, Vec3{2, -3, 40}, Vec3{-34, 9, 3}}) {
             if (vulkan() && eye[0] != 18)
-                continue; // a picture by the software driver takes a second
+                continue; // and a second a picture
             RenderOptions options;
             options.width = vulkan() ? 64 : 160;
             options.height = vulkan() ? 36 : 90;
