@@ -193,8 +193,8 @@ void expect_soft(bool vulkan, const Light& light)
 {
     const Ball ball;
     RenderOptions options = lit_by_one(light);
-    options.width = vulkan ? 32 : 64;
-    options.height = vulkan ? 18 : 36;
+    options.width = 32;
+    options.height = 18;
     options.camera.target = {2, 2, 0};
     options.camera.fov_deg = 13;
     options.look.light_samples = vulkan ? 1024 : 4096;

@@ -117,7 +117,12 @@ protected:
                      const char* name) const
     {
         constexpr double kSeen_mm = 24;
-        const uint32_t side = vulkan() ? 128 : 1600;
+#ifdef __SANITIZE_ADDRESS__
+        constexpr uint32_t kOnCpu = 400;
+#else
+        constexpr uint32_t kOnCpu = 1600;
+#endif
+        const uint32_t side = vulkan() ? 128 : kOnCpu;
         for (const bool parallel : {false, true}) {
             if (parallel && vulkan())
                 continue; // the software driver is slow
