@@ -93,6 +93,8 @@ std::string lower_ending(const std::string& path)
     return ending;
 }
 
+} // namespace
+
 TopoDS_Shape read_shape(const std::string& path, std::string& error)
 {
     const std::string ending = lower_ending(path);
@@ -118,6 +120,8 @@ TopoDS_Shape read_shape(const std::string& path, std::string& error)
     STEPControl_Reader reader;
     return transferred(reader);
 }
+
+namespace {
 
 /// The whole torus: the kernel's box of a torus over negative v can lack half of it.
 void add_torus(const gp_Torus& torus, Bnd_Box& box)

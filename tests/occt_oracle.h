@@ -43,6 +43,10 @@ struct OracleHit {
     bool hit() const { return face >= 0; }
 };
 
+/// The area that a plane through `point` and the file's only solid have in common: BRepAlgoAPI_Common with a face that
+/// is larger than the solid, and BRepGProp. Nothing where there is no such solid or the kernel fails.
+std::optional<double> section_area_mm2(const std::string& path, const Point& point, const Point& normal);
+
 /// Curvatures of a surface at a point, 1/mm and 1/mm^2 of the world.
 struct KernelCurvatures {
     double larger = 0, smaller = 0, mean = 0, gaussian = 0;

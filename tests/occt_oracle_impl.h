@@ -5,6 +5,7 @@
 
 #include <IntCurvesFace_Intersector.hxx>
 #include <TopoDS_Face.hxx>
+#include <TopoDS_Shape.hxx>
 #include <gp_Trsf.hxx>
 #include <tbb/enumerable_thread_specific.h>
 
@@ -51,5 +52,8 @@ struct Oracle::Impl {
 };
 
 double diagonal(const Box& box);
+
+/// STEP, IGES or BREP by the file's name, in mm. Null and a reason in `error` where the kernel cannot.
+TopoDS_Shape read_shape(const std::string& path, std::string& error);
 
 } // namespace trimray::oracle

@@ -1,7 +1,7 @@
 // Maps drawn on surfaces against closed forms, on the CPU and through Vulkan; what both draw, and pictures kept of it.
-#include "runtime/image_io.h"
 #include "runtime/surface_map.h"
 #include "tests/compare_frames.h"
+#include "tests/golden_pictures.h"
 #include "tests/keep_vulkan_loaded.h"
 #include "tests/traced_scenes.h"
 
@@ -11,15 +11,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdlib>
-#include <filesystem>
-#include <fstream>
 #include <functional>
-#include <iostream>
 #include <limits>
 #include <numbers>
 #include <optional>
-#include <span>
 #include <string>
 #include <vector>
 
@@ -603,52 +598,13 @@ TEST(surface_map, the_ends_of_a_range_have_the_scales_full_colours)
 
 // ---- pictures that were looked at ----------------------------------------------------------------------------------
 
-/// Kept under golden/. To make them anew, after a change that is meant: TRIMRAY_WRITE_GOLDEN=1
-/// build/tests/surface_map_test --gtest_filter='*golden*', and look at them.
 class golden_maps : public testing::TestWithParam<SurfaceMap> {};
-
-constexpr int kLittle = 3, kMuch = 40;     // levels of 255
-constexpr double kMostOffByLittle = 0.001; // share of pixels that a compiler's other rounding may move
 
 TEST_P(golden_maps, are_drawn_as_they_were)
 {
-    namespace fs = std::filesystem;
     RenderOptions options = overview(240, 150);
     options.look.map.map = GetParam();
-    Frame frame = draw(all_kinds().finish(), options).frame;
-    composite_over(frame, {1, 1, 1});
-    const Picture actual = to_picture(frame);
-    const std::string name = fmt::format("map_{}.png", surface_map_name(GetParam()));
-    const fs::path path = fs::path(TRIMRAY_TESTS_DIR) / "golden" / name;
-    const auto write = [](const fs::path& to, const Picture& picture) {
-        const Result<std::vector<std::byte>> bytes = encode_png(picture, PngForm::Fewest);
-        ASSERT_TRUE(bytes.ok());
-        std::ofstream(to, std::ios::binary)
-            .write(reinterpret_cast<const char*>(bytes->data()), static_cast<std::streamsize>(bytes->size()));
-    };
-    if (std::getenv("TRIMRAY_WRITE_GOLDEN") != nullptr)
-        write(path, actual);
-    std::ifstream file(path, std::ios::binary);
-    const std::vector<char> bytes((std::istreambuf_iterator<char>(file)), {});
-    const Result<Picture> golden = decode_png(std::as_bytes(std::span(bytes)));
-    ASSERT_TRUE(golden.ok()) << path;
-    ASSERT_EQ(golden->rgba.size(), actual.rgba.size());
-    Picture difference = actual;
-    size_t little = 0, much = 0;
-    for (size_t i = 0; i < actual.rgba.size(); ++i) {
-        const int off = std::abs(int(actual.rgba[i]) - int(golden->rgba[i]));
-        little += off > kLittle;
-        much += off > kMuch;
-        difference.rgba[i] = i % 4 == 3 ? uint8_t(255) : uint8_t(std::min(255, 4 * off));
-    }
-    EXPECT_EQ(much, 0u);
-    EXPECT_LE(double(little), kMostOffByLittle * double(actual.rgba.size()));
-    if (HasFailure()) {
-        const fs::path folder = fs::temp_directory_path();
-        write(folder / ("actual_" + name), actual);
-        write(folder / ("difference_" + name), difference);
-        std::cout << "expected " << path << "; wrote actual_ and difference_" << name << " to " << folder << "\n";
-    }
+    expect_golden(draw(all_kinds().finish(), options).frame, fmt::format("map_{}.png", surface_map_name(GetParam())));
 }
 
 INSTANTIATE_TEST_SUITE_P(, golden_maps,
