@@ -11,12 +11,28 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <optional>
 #include <string>
 
 namespace trimray {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
+
+Material of(std::optional<float> opacity, std::optional<float> mirror = {}, std::optional<float> specular = {})
+{
+    Material material;
+    material.opacity = opacity;
+    material.mirror = mirror;
+    material.specular = specular;
+    return material;
+}
+Material red()
+{
+    Material material = of(1.0f);
+    material.color = {1, 0, 0};
+    return material;
+}
 
 MaterialRule of_all(const Material& material)
 {
@@ -93,7 +109,7 @@ TEST(materials_traced, a_ball_has_two_layers_and_what_hides_it_none)
     scene.add(kKindPlane, 1, {0, 0, -1}, {2, 2});
     RenderOptions options = straight_down(64, 64);
     options.camera.fov_deg = 10;
-    options.look.materials = {of_face(0, {.opacity = 0.5f})};
+    options.look.materials = {of_face(0, of(0.5f))};
     const Frame frame = draw(scene.finish(), options).frame;
     int ball = 0;
     for (size_t i = 0; i < frame.face.size(); ++i) {
@@ -101,7 +117,7 @@ TEST(materials_traced, a_ball_has_two_layers_and_what_hides_it_none)
         ball += frame.face[i] == 0;
     }
     EXPECT_GT(ball, 800);
-    options.look.materials = {of_all({.opacity = 0.5f})};
+    options.look.materials = {of_all(of(0.5f))};
     const Frame both = draw(scene.finish(), options).frame;
     for (size_t i = 0; i < both.face.size(); ++i)
         EXPECT_NEAR(both.rgba[4 * i + 3], both.face[i] == 0 ? 0.875 : 0.5, 1e-6) << i;
@@ -129,7 +145,7 @@ TEST(materials_traced, what_lets_light_through_throws_no_shadow)
     light.shadows = true;
     options.look.lights = {light};
     const size_t middle = 4 * (16 * 32 + 16);
-    options.look.materials = {of_face(1, {.opacity = 0.0f})};
+    options.look.materials = {of_face(1, of(0.0f))};
     const Frame clear = draw(scene.finish(), options).frame;
     TracedScene alone = plates({-2, 3});
     alone.image.faces.pop_back();
@@ -180,14 +196,16 @@ TEST(materials_traced, a_mirror_shows_what_is_beside_it)
     RenderOptions options;
     options.width = options.height = 60;
     options.camera = {{0, -40, 40}, {0, 2, 0}, {0, 0, 1}, 20};
-    options.look.materials = {of_face(0, {.mirror = 1.0f, .specular = 0.0f})};
+    options.look.materials = {of_face(0, of({}, 1.0f, 0.0f))};
     const Frame frame = draw(built, options).frame;
     // the same wall through the mirror's plane: the scene and the eye below it
     RenderOptions turned = options;
-    turned.look.materials = {of_face(0, {.opacity = 0.0f}), of_face(1, {.specular = 0.12f})};
+    turned.look.materials = {of_face(0, of(0.0f)), of_face(1, of({}, {}, 0.12f))};
     turned.camera.eye[2] = -40;
     turned.camera.up = {0, 0, -1};
-    turned.look.lights = {Light{.kind = LightKind::Eye}};
+    Light at_eye;
+    at_eye.kind = LightKind::Eye;
+    turned.look.lights = {at_eye};
     const Frame below = draw(built, turned).frame;
     int compared = 0;
     double worst = 0;
@@ -214,7 +232,7 @@ TEST(materials_traced, two_mirrors_face_to_face_dim_by_each_reflection)
     const auto built = scene.finish();
     RenderOptions options = straight_down(8, 8);
     options.camera = {{0, 0, 0.5}, {0, 0, -1}, {0, 1, 0}, 2};
-    options.look.materials = {of_all({.mirror = 0.5f})};
+    options.look.materials = {of_all(of({}, 0.5f))};
     options.look.sky = 1.0f;
     for (const uint32_t depth : {0u, 1u, 2u, 5u}) {
         options.look.mirror_depth = depth;
@@ -239,8 +257,7 @@ TEST(materials_traced, instruction_sets_and_threads_give_the_same_bits)
 {
     const auto scene = all_kinds().finish();
     RenderOptions options = overview(96, 64);
-    options.look.materials = {of_all({.opacity = 0.5f, .mirror = 0.3f}),
-                              of_face(2, {.color = {{1, 0, 0}}, .opacity = 1.0f})};
+    options.look.materials = {of_all(of(0.5f, 0.3f)), of_face(2, red())};
     options.look.environment = two_colors();
     options.look.mirror_depth = 2;
     const Frame best = draw(scene, options).frame;
@@ -259,8 +276,7 @@ TEST(materials_traced, vulkan_shows_the_same)
         GTEST_SKIP() << "SKIPPED: " << tracer.error().detail;
     ASSERT_TRUE(tracer.ok()) << tracer.error().where << ": " << tracer.error().detail;
     RenderOptions options = overview(96, 64);
-    options.look.materials = {of_all({.opacity = 0.5f, .mirror = 0.3f}),
-                              of_face(2, {.color = {{1, 0, 0}}, .opacity = 1.0f})};
+    options.look.materials = {of_all(of(0.5f, 0.3f)), of_face(2, red())};
     options.look.environment = two_colors();
     options.look.mirror_depth = 2;
     Light sun;
