@@ -948,6 +948,7 @@ void VulkanTracer::take_edges(const FrameView& view)
 void VulkanTracer::describe(RenderStats& stats) const
 {
     const auto used = {use_.primary, use_.caps, use_.light, use_.mirror, use_.blend};
+    stats.buffer_bytes = layer_pixels_.size_bytes();
     for (const VulkanBuffer& buffer : buffers_)
         stats.buffer_bytes += buffer.size_bytes();
     stats.dispatches = dispatches_;
