@@ -1,4 +1,5 @@
 #include "runtime/bench_closest.h"
+#include "runtime/bench_effects.h"
 #include "runtime/bench_moving.h"
 #include "runtime/bench_trims.h"
 #include "runtime/command_json.h"
@@ -37,6 +38,13 @@ struct MovingArguments {
     std::vector<std::string> packs;
     std::string size = "640x360";
     MovingBenchOptions options;
+    bool json = false;
+};
+
+struct EffectsArguments {
+    std::vector<std::string> packs;
+    std::string size = "320x180";
+    EffectsBenchOptions options;
     bool json = false;
 };
 
@@ -177,6 +185,51 @@ void print_moving(const std::string& pack, const MovingReport& report)
         fmt::print("{:<10}{:>10.2f}{:>12.3f}{:>13.3f}{:>11.3f}\n", reuse ? "last hits" : "none", f.frame_ms,
                    f.node_visits, f.leaf_visits, f.newton_steps);
     }
+    fmt::print("\n");
+}
+
+Json figures_json(const EffectFigures& figures)
+{
+    Json row;
+    row["effect"] = figures.effect;
+    row["unsupported"] = figures.unsupported.empty() ? Json() : Json(figures.unsupported);
+    if (!figures.unsupported.empty())
+        return row;
+    const RenderStats& stats = figures.stats;
+    const WorkCounts& work = stats.work;
+    row["frame_ms"] = figures.frame_ms > 0 ? Json(figures.frame_ms) : Json();
+    row["time_to_none"] = figures.time_to_none > 0 ? Json(figures.time_to_none) : Json();
+    row["differing_pixels"] = figures.differing_pixels;
+    row["buffer_bytes"] = stats.buffer_bytes;
+    row["dispatches"] = stats.dispatches;
+    row["pipelines"] = Json::array();
+    for (const PipelineStats& pipeline : stats.pipelines)
+        row["pipelines"].push_back({{"shader", pipeline.shader},
+                                    {"constants", pipeline.constants},
+                                    {"bytes", pipeline.bytes > 0 ? Json(pipeline.bytes) : Json()}});
+    row["work"] = {{"node_visits", work.node_visits},
+                   {"leaf_visits", work.leaf_visits},
+                   {"newton_steps", work.newton_steps},
+                   {"curve_tests", work.curve_tests},
+                   {"edge_tests", work.edge_tests},
+                   {"free_rays", work.free_rays},
+                   {"free_leaf_visits", work.free_leaf_visits}};
+    return row;
+}
+
+void print_effects(const std::string& pack, const EffectsReport& report)
+{
+    fmt::print("{}, {}\n", printable(pack), report.device);
+    fmt::print("{:<20}{:>10}{:>8}{:>13}{:>11}{:>13}{:>11}{:>12}\n", "effect", "frame ms", "x none", "buffer bytes",
+               "dispatches", "leaf visits", "free rays", "differing");
+    for (const EffectFigures& f : report.figures)
+        if (f.unsupported.empty())
+            fmt::print("{:<20}{:>10.2f}{:>8.3f}{:>13}{:>11}{:>13}{:>11}{:>12}\n", f.effect, f.frame_ms, f.time_to_none,
+                       f.stats.buffer_bytes, f.stats.dispatches,
+                       f.stats.work.leaf_visits + f.stats.work.free_leaf_visits, f.stats.work.free_rays,
+                       f.differing_pixels);
+        else
+            fmt::print("{:<20}  {}\n", f.effect, f.unsupported);
     fmt::print("\n");
 }
 
@@ -335,6 +388,41 @@ int run_bench_moving(MovingArguments arguments)
     return kExitOk;
 }
 
+int run_bench_effects(EffectsArguments arguments)
+{
+    const Result<PictureSize> size = parse_size(arguments.size, 1);
+    if (!size.ok())
+        return report_error(size.error());
+    EffectsBenchOptions& options = arguments.options;
+    if (const Status known = check_choice(device_choice(), options.device); !known.ok())
+        return report_error(known.error());
+    options.width = size->width;
+    options.height = size->height;
+
+    Json packs = Json::array();
+    std::string device;
+    const auto bench = [&](const auto& scene, const auto& progress) { return bench_effects(scene, options, progress); };
+    const auto take = [&](const std::string& pack, const EffectsReport& report) {
+        device = report.device;
+        Json object{{"pack", pack}, {"camera", camera_json(report.camera)}, {"effects", Json::array()}};
+        for (const EffectFigures& figures : report.figures)
+            object["effects"].push_back(figures_json(figures));
+        packs.push_back(std::move(object));
+        if (!arguments.json)
+            print_effects(pack, report);
+    };
+    if (const int code = bench_each(arguments.packs, bench, take); code != kExitOk)
+        return code;
+    if (arguments.json)
+        print_json({{"device", device},
+                    {"width", size->width},
+                    {"height", size->height},
+                    {"threads", options.threads},
+                    {"rounds", options.rounds},
+                    {"packs", packs}});
+    return kExitOk;
+}
+
 /// What all benches ask for.
 template <class Arguments>
 void add_packs(CLI::App& command, Arguments& a)
@@ -408,6 +496,31 @@ void register_bench_moving(CLI::App& bench, int& exit_code)
     moving->callback([a, &exit_code] { exit_code = run_bench_moving(*a); });
 }
 
+void register_bench_effects(CLI::App& bench, int& exit_code)
+{
+    CLI::App* effects = bench.add_subcommand("effects", "Time, memory and work of a picture with each effect alone");
+    const auto a = std::make_shared<EffectsArguments>();
+    add_packs(*effects, *a);
+    effects->add_option("--device", a->options.device, "auto, cpu, vulkan or reference")->capture_default_str();
+    effects->add_option("--effects", a->options.effects, "Which, with commas; default: all, and none")->delimiter(',');
+    effects->add_option("--rounds", a->options.rounds, "How often each is timed; 0: each picture is made once, untimed")
+        ->capture_default_str()
+        ->check(CLI::Range(0u, 10000u));
+    effects->add_option("--threads", a->options.threads, "CPU threads; 0: all cores")
+        ->capture_default_str()
+        ->check(CLI::Range(0u, 1024u));
+    effects->add_option("--instruction-set", a->options.instruction_set, "avx512, avx2 or sse4; default: the best");
+    effects->footer(
+        "Frames are timed in turns: 'x none' is the median over the rounds of the frame's time over that of the frame\n"
+        "without effects. Memory and work are of one frame by a tracer that has made no other. 'unspecialised' is the\n"
+        "picture without effects by a tracer that has everything compiled in and finds out at run time what is asked\n"
+        "for; 'differing' are pixels that are not those of the picture without effects.\n\n"
+        "Examples:\n"
+        "  trimray bench effects model.tray\n"
+        "  trimray bench effects model.tray --device vulkan --effects none,occlusion,unspecialised --json");
+    effects->callback([a, &exit_code] { exit_code = run_bench_effects(*a); });
+}
+
 } // namespace
 
 void register_bench(CLI::App& app, int& exit_code)
@@ -415,9 +528,10 @@ void register_bench(CLI::App& app, int& exit_code)
     CLI::App* bench = app.add_subcommand("bench", "Measure a part of the tracer on packs");
     bench->require_subcommand(1);
     bench->footer("Examples:\n  trimray bench trims model.tray\n  trimray bench closest model.tray\n  "
-                  "trimray bench moving model.tray\n\n'trimray bench "
+                  "trimray bench effects model.tray\n  trimray bench moving model.tray\n\n'trimray bench "
                   "trims --help' describes the first.");
     register_bench_closest(*bench, exit_code);
+    register_bench_effects(*bench, exit_code);
     register_bench_moving(*bench, exit_code);
     CLI::App* trims = bench->add_subcommand("trims", "Time and errors of every trim mode, source, layout and memory");
     const auto a = std::make_shared<BenchArguments>();

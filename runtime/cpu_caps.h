@@ -133,7 +133,7 @@ private:
         for (uint left = inside; left != 0; left &= left - 1) {
             const int lane = __builtin_ctz(left);
             const uint face = job_.scene.image.patches[job_.scene.image.leaves[leaves[lane]].patch].face;
-            const float* color = section_.has_color != 0 ? section_.color : color_of(job_, face, instances[lane]);
+            const float* color = section_.has_color != 0 ? section_.color : color_of<true>(job_, face, instances[lane]);
             red[lane] = color[0];
             green[lane] = color[1];
             blue[lane] = color[2];

@@ -18,6 +18,7 @@
 #include "shaders/shared/section.h"
 
 #include <array>
+#include <utility>
 
 SHARED_OPEN
 
@@ -28,6 +29,10 @@ struct FreePacket {
     real reach;
     mask alive;
     float footprint; // how well hits must be known: a pixel's width where the rays come from
+};
+
+struct FreeLeaf {
+    uint leaf, instance;
 };
 
 /// The surfaces that a packet's rays cross, unordered.
@@ -41,7 +46,7 @@ struct Crossings {
 
 /// Two hits of one instance that both enter or both leave within `apart` are one: faces overlap there.
 [[maybe_unused]] static HWY_ATTR HWY_NOINLINE void add_crossings(Crossings& crossings, mask taken, real at, real apart,
-                                                                 mask leaves, const LeafAt& leaf)
+                                                                 mask leaves, const FreeLeaf& leaf)
 {
     alignas(64) float s[kLanes], slack[kLanes];
     store(at, s);
@@ -67,7 +72,8 @@ struct Crossings {
 struct FreeRays {
     static constexpr bool kCertifies = false;
     static constexpr bool kCollects = true;
-    mask alive;
+    using Leaf = FreeLeaf;
+    mask on;
     real from; // s at t = 0
     real rounding;
     float pixel;          // patch units
@@ -76,11 +82,19 @@ struct FreeRays {
     real base() const { return from; }
     float per_t() const { return 1; }
     real slack() const { return rounding; }
+    const mask& alive() const { return on; }
     HWY_ATTR mask is_ahead(real at) const { return at > 0.0f; }
     float footprint() const { return pixel; }
     HWY_ATTR real footprint(real) const { return real(pixel); }
 
-    HWY_ATTR HWY_INLINE bool collect(mask taken, real at, mask leaves, const LeafAt& leaf, float tolerance_mm) const
+    static KeptMiddle kept_middle(BlockScratch& scratch, const Leaf& leaf)
+    {
+        FreeMiddles& kept = scratch.free_middles;
+        const size_t slot = leaf.leaf % FreeMiddles::kCount;
+        return {kept.middle[slot], std::exchange(kept.leaf[slot], leaf.leaf) == leaf.leaf};
+    }
+
+    HWY_ATTR HWY_INLINE bool collect(mask taken, real at, mask leaves, const Leaf& leaf, float tolerance_mm) const
     {
         if (!crossings)
             return false;
@@ -92,7 +106,7 @@ struct FreeRays {
 class FreeWalk {
 public:
     FreeWalk(const BlockJob& job, BlockScratch& scratch, const FetchSource& source, WorkCounts& work)
-        : job_(job), scratch_(scratch), work_(work), image_(job.scene.image), leaf_hits_(job, scratch, source, work)
+        : job_(job), work_(work), image_(job.scene.image), leaf_hits_(job, scratch, source, work)
     {
         FreeMiddles& kept = scratch.free_middles;
         kept.middle.resize(FreeMiddles::kCount);
@@ -182,12 +196,7 @@ private:
             return;
         work_.free_leaf_visits += lane_count(alive);
         const FreeRays free{rays.alive && hit.best > -kHuge, from, rounding, part_footprint * per_scale, crossings_};
-        FreeMiddles& kept = scratch_.free_middles;
-        const size_t slot = leaf_id % FreeMiddles::kCount;
-        uint8_t has_middle = kept.leaf[slot] == leaf_id;
-        const LeafAt at{leaf_id, instance, &kept.middle[slot], &has_middle};
-        leaf_hits_.intersect(free, at, origin, direction, hit);
-        kept.leaf[slot] = has_middle != 0 ? leaf_id : ~0u;
+        leaf_hits_.intersect(free, {leaf_id, instance}, patch, origin, direction, hit);
     }
 
     struct Waiting {
@@ -230,7 +239,6 @@ private:
     }
 
     const BlockJob& job_;
-    BlockScratch& scratch_;
     WorkCounts& work_;
     const PackImage& image_;
     LeafHits<FreeRays> leaf_hits_;

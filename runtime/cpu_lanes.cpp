@@ -16,10 +16,12 @@ alignas(64) constexpr uint kLaneNumbers[kLanes] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9,
 
 void trace_block(const BlockJob& job, const Block& block, BlockScratch& scratch, Frame& frame, WorkCounts& work)
 {
-    if (job.section || (job.materials && job.materials->transparent))
-        BlockTracer<true>(job, scratch, frame, work).trace(block);
+    if (!job.specialise || job.section || (job.materials && job.materials->transparent))
+        BlockTracer<Effects::Spans>(job, scratch, frame, work).trace(block);
+    else if (job.light || job.materials || job.map || job.environment)
+        BlockTracer<Effects::Look>(job, scratch, frame, work).trace(block);
     else
-        BlockTracer<false>(job, scratch, frame, work).trace(block);
+        BlockTracer<Effects::None>(job, scratch, frame, work).trace(block);
 }
 
 HWY_ATTR void answer_trims(const CpuScene& scene, TrimMode trim, std::span<const TrimQueries> queries,

@@ -118,6 +118,7 @@ struct BlockJob {
     const PlaceView* places = nullptr;         // where there is light or a section
     std::span<const WorldToPart> to_part = {}; // by instance, where rays begin elsewhere than at the eye
     const MapJob* map = nullptr;               // null: surfaces have their own colours
+    bool specialise = true;                    // false: by the instance that can do everything
 };
 
 /// Traces the block into `frame`, whose arrays have their size.

@@ -23,14 +23,15 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <type_traits>
+#include <utility>
 
 SHARED_OPEN
 
-/// A leaf, and where its plane is kept once it was evaluated.
-struct LeafAt {
-    uint leaf, instance;
-    LeafMiddle* middle;
-    uint8_t* has_middle;
+/// Where a leaf's plane is kept, and whether it is there.
+struct KeptMiddle {
+    LeafMiddle& values;
+    bool known;
 };
 
 /// The last native patches that a packet was tested against: one with several leaves need not be met again.
@@ -58,35 +59,43 @@ private:
 struct EyeRays {
     static constexpr bool kCertifies = true; // what stays open of them is told in PacketHit::doubt
     static constexpr bool kCollects = false;
+    using Leaf = Candidate; // one of the scratch's
     const PatchView& view;
-    const mask& alive;
-    // `at` of the eye, or of its plane where they are parallel, or of the section plane where they begin
-    const real& begin;
+    const Packet& packet;
 
     float base() const { return view.base_mm; } // `at` of t is base + per_t t
     float per_t() const { return view.mm_per_t; }
     float slack() const { return view.slack_mm; } // rounding of `at`
-    HWY_ATTR mask is_ahead(real at) const { return at > begin; }
+    const mask& alive() const { return packet.alive; }
+    HWY_ATTR mask is_ahead(real at) const { return at > packet.begin; }
     /// A pixel's width where the patch is, and at t; patch units.
     float footprint() const { return view.pixel * std::abs(view.tau); }
     HWY_ATTR real footprint(real t) const { return view.pixel * (view.tau + t); }
+
+    /// Where the leaf's plane is kept: it counts as known from now on.
+    static KeptMiddle kept_middle(BlockScratch& scratch, const Leaf& leaf)
+    {
+        const size_t candidate = size_t(&leaf - scratch.candidates.data());
+        return {scratch.leaf_middles[candidate], std::exchange(scratch.has_middle[candidate], uint8_t{1}) != 0};
+    }
 };
 
 /// Rays: what EyeRays has, and where kCollects is true, collect: where that takes the hits none is the nearest.
 template <class Rays>
 class LeafHits {
 public:
+    using Leaf = typename Rays::Leaf;
+
     LeafHits(const BlockJob& job, BlockScratch& scratch, const FetchSource& source, WorkCounts& work)
         : job_(job), scratch_(scratch), source_(source), work_(work), image_(job.scene.image)
     {
     }
 
     /// Offers the hits of the rays with one leaf: a ray's point at t is origin + t direction, patch space. True if a
-    /// ray's nearest hit changed.
-    HWY_ATTR HWY_INLINE bool intersect(const Rays& rays, const LeafAt& at, const real3& origin, const real3& direction,
-                                       PacketHit& hit)
+    /// ray's nearest hit changed. `patch`: the leaf's.
+    HWY_ATTR HWY_INLINE bool intersect(const Rays& rays, const Leaf& at, const PatchRecord& patch, const real3& origin,
+                                       const real3& direction, PacketHit& hit)
     {
-        const PatchRecord& patch = image_.patches[image_.leaves[at.leaf].patch];
         const FaceRecord& face = image_.faces[patch.face];
         const bool rim = (face.flags & kFaceRims) != 0 && job_.view.instances[at.instance].outside;
         Target target{rays, at, patch, face, rim, direction, false};
@@ -132,8 +141,9 @@ public:
 
 private:
     struct Target {
-        const Rays& rays;
-        const LeafAt& at;
+        // what is as small as its address saves a way through memory by every leaf
+        std::conditional_t<sizeof(Rays) <= 2 * sizeof(void*), const Rays, const Rays&> rays;
+        const Leaf& at;
         const PatchRecord& patch;
         const FaceRecord& face;
         bool rim; // the face has one, and the eye sees it from outside
@@ -194,7 +204,8 @@ private:
         const BoxHit in_box = leaf_box_hit(box, origin, direction, kBoxMargin);
         const auto base = target.rays.base();
         const float per_t = target.rays.per_t();
-        mask moving = in_box.hit && target.rays.alive && base + per_t * in_box.near < hit.best + target.rays.slack() &&
+        mask moving = in_box.hit && target.rays.alive() &&
+                      base + per_t * in_box.near < hit.best + target.rays.slack() &&
                       target.rays.is_ahead(base + per_t * in_box.far);
         if (!any_lane(moving))
             return;
@@ -294,20 +305,18 @@ private:
     }
 
     /// The leaf's plane, evaluated when it is first asked for.
-    HWY_ATTR LeafPlane middle_of(const NewtonPatch& newton, const LeafBox& box, const float (&lost)[2],
-                                 const LeafAt& at)
+    HWY_ATTR LeafPlane middle_of(const NewtonPatch& newton, const LeafBox& box, const float (&lost)[2], const Leaf& at)
     {
         static_assert(sizeof(LeafPlane) <= sizeof(LeafMiddle));
-        LeafMiddle& kept = *at.middle;
+        const KeptMiddle kept = Rays::kept_middle(scratch_, at);
         LeafPlane leaf;
-        if (!*at.has_middle) {
+        if (!kept.known) {
             const SurfacePoint s = newton.at(real2(leaf_middle(box)));
             leaf = leaf_plane(box, first_lane(s.p), first_lane(s.du), first_lane(s.dv),
                               derivative_loss(box, scalar2(lost[0], lost[1]), newton.degree_u, newton.degree_v));
-            std::memcpy(&kept, &leaf, sizeof leaf);
-            *at.has_middle = 1;
+            std::memcpy(&kept.values, &leaf, sizeof leaf);
         }
-        std::memcpy(&leaf, &kept, sizeof leaf);
+        std::memcpy(&leaf, &kept.values, sizeof leaf);
         return leaf;
     }
 

@@ -61,7 +61,7 @@ private:
             seen = environment_along(*job_.environment, rays.direction);
         if (!any_lane(hits))
             return seen;
-        const PacketShading shading = shade_leaves(job_, hit, lane_bits(hits));
+        const PacketShading shading = shade_leaves<true>(job_, hit, lane_bits(hits));
         const real size = length(shading.normal);
         const mask has_normal = size > 0.0f && hits;
         LitPoints points;

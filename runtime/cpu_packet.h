@@ -26,17 +26,26 @@
 
 SHARED_OPEN
 
-/// kSpans: rays may begin on their way, at section planes or behind surfaces that let light through.
-template <bool kSpans>
+/// What a BlockTracer can do beside showing the pack in its own colours under the light at the eye.
+enum class Effects {
+    None,
+    Look,  // lights, materials, maps and environments, where the job has them
+    Spans, // these, and rays that begin on their way, at section planes or behind surfaces that let light through
+};
+
+template <Effects kEffects>
 class BlockTracer {
+    static constexpr bool kLook = kEffects != Effects::None, kSpans = kEffects == Effects::Spans;
+
 public:
     HWY_ATTR BlockTracer(const BlockJob& job, BlockScratch& scratch, Frame& frame, WorkCounts& work)
         : job_(job), scratch_(scratch), frame_(frame), work_(work), image_(job.scene.image),
           source_(fetch_source(job.scene.image, job.kd)), leaf_hits_(job, scratch, source_, work),
           edges_(job, scratch, source_, work)
     {
-        if (job.light)
-            light_.emplace(job, scratch, source_, work);
+        if constexpr (kLook)
+            if (job.light)
+                light_.emplace(job, scratch, source_, work);
         span_ = {real(-float(job.view.depth_ref)), real(kHuge), integer(kNoPlane)};
         if constexpr (kSpans)
             if (job.section)
@@ -76,6 +85,7 @@ public:
                         if constexpr (kSpans)
                             if (caps_)
                                 span_ = caps_->span(packet);
+                        packet.begin = span_.begin;
                         kept_ = keeps ? &job_.stochastic->kept->of_packet(x, y) : nullptr;
                         const PixelRect rect = pixel_rect({x, y, x + 4, y + 4});
                         PacketHit hit = trace_twice(packet, rect);
@@ -134,26 +144,28 @@ private:
     /// Puts the packet's pixels at (x, y) of the strip. A cap hides the hit behind it.
     HWY_ATTR void write(const Packet& packet, const PixelRect& rect, PacketHit& hit, uint32_t x, uint32_t y)
     {
-        PacketLight* const light = light_ ? &*light_ : nullptr;
         PacketCaps caps;
         if constexpr (kSpans)
             if (caps_)
                 caps = caps_->find(packet, span_, hit);
-        if (put_misses(job_, packet, hit, x, y, scratch_.strip, work_))
+        if (put_misses(job_, kLook && job_.environment, packet, hit, x, y, scratch_.strip, work_))
             return;
         SeenPacket seen =
-            see_packet(job_, packet, hit, kSpans && caps_ ? &caps : nullptr, light, x, y, &scratch_.strip);
+            see_packet<kLook>(job_, packet, hit, kSpans && caps_ ? &caps : nullptr, light(), x, y, &scratch_.strip);
         real alpha = select(seen.hits, real(1.0f), real(0.0f));
         if constexpr (kSpans)
             if (job_.materials && job_.materials->transparent)
                 alpha = see_through(packet, rect, hit, seen);
-        if (job_.environment)
-            alpha = see_environment(packet, alpha, seen);
+        if constexpr (kLook)
+            if (job_.environment)
+                alpha = see_environment(packet, alpha, seen);
         put_packet(seen, alpha, packet.alive, x, y, scratch_.strip, work_);
         if constexpr (kSpans)
             if (caps_)
                 hit.best = select(caps.here, real(kHuge), hit.best);
     }
+
+    PacketLight* light() { return kLook && light_ ? &*light_ : nullptr; }
 
     /// Blends what lies behind surfaces that let light through into seen.color; returns the pixels' alpha. Each layer
     /// is traced from behind the one before it, so layers come in their order along the ray.
@@ -173,9 +185,9 @@ private:
             const real past = select(on, hit.best, real(0.0f));
             const real away = start_distance(places.at(packet, past), places.footprint(past) * job_.error_px);
             span_.begin = select(on, past + away / speed, real(kHuge));
-            const Packet rays{packet.x, packet.y, on};
+            const Packet rays{packet.x, packet.y, on, span_.begin};
             hit = trace_twice(rays, rect);
-            const SeenPacket behind = see_packet(job_, rays, hit, nullptr, light_ ? &*light_ : nullptr, 0, 0, nullptr);
+            const SeenPacket behind = see_packet<kLook>(job_, rays, hit, nullptr, light(), 0, 0, nullptr);
             on = on && behind.hits;
             const real share = select(on, left * behind.opacity, real(0.0f));
             sum = sum + select(on, behind.color, real3(real(0.0f), real(0.0f), real(0.0f))) * share;
@@ -268,11 +280,9 @@ private:
                              packet.y * scalar3(view.step_y[0], view.step_y[1], view.step_y[2]);
         const scalar3 middle(view.origin[0], view.origin[1], view.origin[2]);
         const scalar3 w0(view.w0[0], view.w0[1], view.w0[2]);
-        const LeafAt at{candidate.leaf, candidate.instance, &scratch_.leaf_middles[candidate_index],
-                        &scratch_.has_middle[candidate_index]};
         const real3 origin = middle + across * real(view.tau), direction = w0 + across;
-        const EyeRays rays{view, packet.alive, span_.begin};
-        return leaf_hits_.intersect(rays, at, origin, direction, hit);
+        const EyeRays rays{view, packet};
+        return leaf_hits_.intersect(rays, candidate, image_.patches[patch_id], origin, direction, hit);
     }
 
     const BlockJob& job_;

@@ -102,6 +102,10 @@ public:
                 stats.frame_cpu_ms.push_back(1e3 * (thread_cpu_seconds() - cpu_start));
             take_queries(stats.trim_queries);
         }
+        stats.buffer_bytes = stats.kd_bytes + stats.border_bytes + (has_effects(options) ? edge_map_.size_bytes() : 0) +
+                             (asks_free_rays ? to_part_.size() * sizeof(WorldToPart) : 0) +
+                             (options.shade && has_materials(options.look) ? materials->size_bytes() : 0) +
+                             kept_.packets.size() * sizeof(KeptPacket) + frame.map_value.size() * sizeof(float);
         return frame;
     }
 
@@ -159,6 +163,7 @@ private:
                 edges.emplace(EdgeJob{query, *border_cells_, edge_map_, options, drawer ? &*drawer : nullptr});
         }
         job.edges = edges ? &*edges : nullptr;
+        job.specialise = options.specialise;
         const uint32_t columns = (options.width + kBlockSide - 1) / kBlockSide,
                        rows = (options.height + kBlockSide - 1) / kBlockSide;
         tbb::enumerable_thread_specific<WorkCounts> counts;

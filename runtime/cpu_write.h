@@ -36,6 +36,8 @@ struct Packet {
     real x; // pixels from the picture's centre
     real y;
     mask alive;
+    real begin; // rays hit nothing up to there, as PacketHit::best: the eye, or its plane where they are parallel, or
+                // the section plane or surface that they begin at
 };
 
 /// Where points of the pixels' rays are in the top tree's units.
@@ -62,12 +64,14 @@ private:
     const PlaceView& view_;
 };
 
-/// A face's colour, linear light.
-static inline const float* color_of(const BlockJob& job, uint face, uint instance)
+/// A face's colour, linear light. kLook: by the job's materials, where it has some.
+template <bool kLook>
+const float* color_of(const BlockJob& job, uint face, uint instance)
 {
-    if (job.materials)
-        if (const MaterialRecord& material = job.materials->of(face, instance); material.has_color > 0)
-            return material.color;
+    if constexpr (kLook)
+        if (job.materials)
+            if (const MaterialRecord& material = job.materials->of(face, instance); material.has_color > 0)
+                return material.color;
     const bool own = (job.scene.image.faces[face].flags & kFaceHasColor) != 0;
     return own ? job.scene.face_color[face].data() : job.scene.instance_color[instance].data();
 }
@@ -78,12 +82,12 @@ struct PacketShading {
     real3 color;  // linear
     real2 uv_file;
     integer face;
-    real specular, mirror, opacity; // where the job has materials
+    real specular, mirror, opacity; // where kLook
 };
 
-/// One leaf at a time, in all the lanes that hit it.
-[[maybe_unused]] static HWY_ATTR HWY_NOINLINE PacketShading shade_leaves(const BlockJob& job, const PacketHit& hit,
-                                                                         uint hit_lanes)
+/// One leaf at a time, in all the lanes that hit it. kLook: the job may have materials.
+template <bool kLook>
+HWY_ATTR HWY_NOINLINE PacketShading shade_leaves(const BlockJob& job, const PacketHit& hit, uint hit_lanes)
 {
     const PackImage& image = job.scene.image;
     alignas(64) uint leaves[kLanes], instances[kLanes];
@@ -94,7 +98,7 @@ struct PacketShading {
     out.color = out.normal;
     out.uv_file = real2(real(0.0f), real(0.0f));
     out.face = integer(~0u);
-    if (job.materials) { // caps are plain
+    if constexpr (kLook) { // caps are plain, and what has no materials
         out.specular = real(kSpecular);
         out.mirror = real(0.0f);
         out.opacity = real(1.0f);
@@ -113,7 +117,7 @@ struct PacketShading {
         const scalar3 z(patch.axis_z[0], patch.axis_z[1], patch.axis_z[2]);
         const real3 in_part = combine(x, y, z, hit.normal * real(turn));
         out.normal = select(here, to_world(job.view.instances[instance_id].normal, in_part), out.normal);
-        const float* color = color_of(job, patch.face, instance_id);
+        const float* color = color_of<kLook>(job, patch.face, instance_id);
         out.color = select(here, real3(scalar3(color[0], color[1], color[2])), out.color);
         const float lo[2] = {float(face.domain_lo[0]), float(face.domain_lo[1])};
         const float size[2] = {float(face.domain_hi[0] - face.domain_lo[0]),
@@ -121,12 +125,13 @@ struct PacketShading {
         out.uv_file =
             select(here, real2(lo[0] + size[0] * hit.uv_face.x, lo[1] + size[1] * hit.uv_face.y), out.uv_file);
         out.face = select(here, integer(patch.face), out.face);
-        if (job.materials) {
-            const MaterialRecord& material = job.materials->of(patch.face, instance_id);
-            out.specular = select(here, real(material.specular), out.specular);
-            out.mirror = select(here, real(material.mirror), out.mirror);
-            out.opacity = select(here, real(material.opacity), out.opacity);
-        }
+        if constexpr (kLook)
+            if (job.materials) {
+                const MaterialRecord& material = job.materials->of(patch.face, instance_id);
+                out.specular = select(here, real(material.specular), out.specular);
+                out.mirror = select(here, real(material.mirror), out.mirror);
+                out.opacity = select(here, real(material.opacity), out.opacity);
+            }
     }
     return out;
 }
@@ -180,7 +185,7 @@ struct SeenPacket {
     real2 uv;
     integer face, instance;
     real3 color;
-    real opacity; // of what was hit
+    real opacity; // of what was hit; where kLook
     mask certified;
 };
 
@@ -277,10 +282,37 @@ HWY_INLINE void copy_to_strip(const PacketPixels& pixels, uint32_t x, uint32_t y
     return real3(channel(0), channel(1), channel(2));
 }
 
-/// The pixels of hits. Light: PacketLight (runtime/cpu_light.h); null where there is the light at the eye alone. Caps
-/// are hits without a leaf; null where there are none. Values of maps that measure go to (x, y) of the strip, if there
-/// is one.
+/// The colours of hits whose materials, map or lights the job may have: see_packet has the arguments.
 template <class Light>
+HWY_ATTR HWY_INLINE real3 look_at(const BlockJob& job, const Packet& packet, const PacketHit& hit,
+                                  const PacketShading& shading, const SeenPacket& seen, real3 to_eye,
+                                  uint surface_lanes, Light* light, uint32_t x, uint32_t y, Strip* strip)
+{
+    real3 surface = shading.color;
+    mask glows(false); // pixels whose map is seen as it is
+    if (job.map != nullptr) {
+        const MapHits on_map{packet.x, packet.y, hit.best, hit.leaf, hit.instance, hit.uv_face, seen.normal, to_eye};
+        const MapColor map = map_hits(job, on_map, surface_lanes);
+        const mask mapped = lanes_of(surface_lanes);
+        surface = select(mapped, map.color, surface);
+        if (!is_lit_map(job.map->map))
+            glows = mapped;
+        if (strip && job.map->measures)
+            write_values(select(mapped, map.value, real(0.0f)), x, y, *strip);
+    }
+    const mask lit = seen.hits && !glows;
+    if (!any_lane(lit))
+        return surface;
+    const real3 color =
+        light ? light->lit(packet, {hit.best, seen.normal, to_eye, surface, shading.specular, shading.mirror, lit})
+              : shade(surface, seen.normal, to_eye);
+    return select(glows, surface, color);
+}
+
+/// The pixels of hits. kLook: the job may have materials or a map. Light: PacketLight (runtime/cpu_light.h); null where
+/// there is the light at the eye alone. Caps are hits without a leaf; null where there are none. Values of maps that
+/// measure go to (x, y) of the strip, if there is one.
+template <bool kLook, class Light>
 HWY_ATTR HWY_INLINE SeenPacket see_packet(const BlockJob& job, const Packet& packet, const PacketHit& hit,
                                           const PacketCaps* caps, Light* light, uint32_t x, uint32_t y, Strip* strip)
 {
@@ -288,7 +320,7 @@ HWY_ATTR HWY_INLINE SeenPacket see_packet(const BlockJob& job, const Packet& pac
     seen.hits = packet.alive && hit.best < kHuge;
     const uint hit_lanes = lane_bits(seen.hits);
     const uint surface_lanes = caps ? hit_lanes & ~lane_bits(caps->here) : hit_lanes;
-    PacketShading shading = shade_leaves(job, hit, surface_lanes);
+    PacketShading shading = shade_leaves<kLook>(job, hit, surface_lanes);
     if (caps)
         show_caps(*caps, shading);
     const View& view = job.view;
@@ -304,30 +336,14 @@ HWY_ATTR HWY_INLINE SeenPacket see_packet(const BlockJob& job, const Packet& pac
     // a surface without a normal faces the eye
     const real3 to_eye = along * (-1.0f / speed);
     seen.normal = select(has_normal, shading.normal * (1.0f / select(has_normal, size, real(1.0f))), to_eye);
-    real3 surface = shading.color;
-    mask glows(false); // pixels whose map is seen as it is
-    if (job.map != nullptr) {
-        const MapHits on_map{packet.x, packet.y, hit.best, hit.leaf, hit.instance, hit.uv_face, seen.normal, to_eye};
-        const MapColor map = map_hits(job, on_map, surface_lanes);
-        const mask mapped = lanes_of(surface_lanes);
-        surface = select(mapped, map.color, surface);
-        if (!is_lit_map(job.map->map))
-            glows = mapped;
-        if (strip && job.map->measures)
-            write_values(select(mapped, map.value, real(0.0f)), x, y, *strip);
-    }
-    seen.color = surface;
-    if (any_lane(seen.hits && !glows)) {
-        const real specular = job.materials ? shading.specular : real(kSpecular);
-        const real mirror = job.materials ? shading.mirror : real(0.0f);
-        seen.color =
-            light ? light->lit(packet, {hit.best, seen.normal, to_eye, surface, specular, mirror, seen.hits && !glows})
-                  : shade(surface, seen.normal, to_eye);
-        seen.color = select(glows, surface, seen.color);
+    if constexpr (kLook) {
+        seen.color = look_at(job, packet, hit, shading, seen, to_eye, surface_lanes, light, x, y, strip);
+        seen.opacity = shading.opacity;
+    } else {
+        seen.color = shade(shading.color, seen.normal, to_eye);
     }
     if (!job.shade)
         seen.color = real3(real(0.0f), real(0.0f), real(0.0f));
-    seen.opacity = job.materials ? shading.opacity : real(1.0f);
     seen.uv = shading.uv_file;
     seen.face = shading.face;
     seen.instance = hit.instance;
@@ -357,12 +373,13 @@ HWY_ATTR HWY_INLINE SeenPacket see_packet(const BlockJob& job, const Packet& pac
     copy_to_strip(pixels, x, y, strip);
 }
 
-/// Whether no pixel of the packet needs more than what all misses show; then it is put there.
-[[maybe_unused]] static HWY_ATTR HWY_INLINE bool put_misses(const BlockJob& job, const Packet& packet,
+/// Whether no pixel of the packet needs more than what all misses show; then it is put there. `seen`: misses see
+/// something.
+[[maybe_unused]] static HWY_ATTR HWY_INLINE bool put_misses(const BlockJob& job, bool seen, const Packet& packet,
                                                             const PacketHit& hit, uint32_t x, uint32_t y, Strip& strip,
                                                             WorkCounts& work)
 {
-    if (any_lane(packet.alive && hit.best < kHuge) || job.environment)
+    if (seen || any_lane(packet.alive && hit.best < kHuge))
         return false;
     if (job.stochastic) {
         copy_to_strip(kDoubtfulMisses, x, y, strip);

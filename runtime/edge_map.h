@@ -53,6 +53,7 @@ struct EdgeMap {
 
     /// For a picture of this size; `lines` and `borders`: which words there are. Nothing is near anything then.
     void resize(uint32_t width, uint32_t height, bool lines, bool borders);
+    size_t size_bytes() const { return near.size() + (line.size() + border.size()) * sizeof(uint32_t); }
     size_t packet_of(uint32_t x, uint32_t y) const { return size_t{y / 4} * columns + x / 4; }
     size_t word_of(uint32_t x, uint32_t y) const { return 16 * packet_of(x, y) + 4 * (y % 4) + x % 4; }
     size_t block_of(uint32_t x, uint32_t y) const

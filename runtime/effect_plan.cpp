@@ -19,6 +19,9 @@ namespace {
 // two evaluations of 26 x 26 points and 6 x 350 steps of their polynomials.
 constexpr uint32_t kSoftwareIterationLimit = 42000, kSoftwareIterationLimitWithEdges = 28000, kMapIterations = 6000;
 
+// Two trees of kMaxBvhDepth that leave 3 waiting children a node
+constexpr uint32_t kLargestStackSize = 290;
+
 // Larger nets are read from the buffer on the software driver too: so many floats lie beside each invocation
 constexpr uint32_t kMostLocalFloats = 1024;
 
@@ -297,11 +300,14 @@ EffectPlan effect_plan(const PackFacts& facts, const RenderOptions& options, Dev
     plan.layers = (plan.look & kLookTransparency) != 0;
     plan.mirrors = (plan.look & kLookMirrors) != 0;
     plan.environment = (plan.look & kLookEnvironment) != 0;
-    plan.stack_size = facts.stack_size;
+    plan.specialised = options.specialise;
+    plan.stack_size = plan.specialised ? facts.stack_size : kLargestStackSize;
     if (device == DeviceKind::SoftwareVulkan) {
-        plan.local_floats = facts.largest_net_floats <= kMostLocalFloats ? facts.largest_net_floats : 0;
-        plan.iteration_limit = (plan.edges ? kSoftwareIterationLimitWithEdges : kSoftwareIterationLimit) -
-                               (plan.map != SurfaceMap::None ? kMapIterations : 0);
+        const uint32_t net_floats = plan.specialised ? facts.largest_net_floats : kMostLocalFloats;
+        plan.local_floats = facts.largest_net_floats <= kMostLocalFloats ? net_floats : 0;
+        plan.iteration_limit =
+            (plan.edges || !plan.specialised ? kSoftwareIterationLimitWithEdges : kSoftwareIterationLimit) -
+            (plan.map != SurfaceMap::None || !plan.specialised ? kMapIterations : 0);
     }
 
     std::vector<EffectItem>& items = plan.items;

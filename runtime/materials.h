@@ -29,6 +29,11 @@ struct MaterialTable {
     {
         return of_classes[size_t{instance_class[instance]} * face_classes + face_class[face]];
     }
+    size_t size_bytes() const
+    {
+        return materials.size() * sizeof(MaterialRecord) +
+               (face_class.size() + instance_class.size() + of_classes.size()) * sizeof(uint32_t);
+    }
     const MaterialRecord& of(uint32_t face, uint32_t instance) const { return materials[index(face, instance)]; }
 };
 

@@ -86,6 +86,10 @@ struct RenderOptions {
     std::optional<std::array<float, 3>> edge_color;
     bool antialias_trims = false; // borders and rims of faces blended with what is beside them, from one sample a pixel
 
+    // false: traced by a program for every scene, which finds out pixel by pixel what the effect plan knows beforehand:
+    // a measuring device for what specialisation is worth. The picture is the same
+    bool specialise = true;
+
     SceneLook look; // lights, materials, shadows, sections, maps
 };
 
@@ -129,6 +133,13 @@ struct WorkCounts {
     }
 };
 
+/// A compute pipeline that a picture was made with.
+struct PipelineStats {
+    std::string shader;              // "primary", "light", "caps", "mirror", "blend"
+    std::vector<uint32_t> constants; // what it is specialised to, by kSpec... (shaders/frame_layout.h)
+    uint64_t bytes = 0;              // of what the driver made of it, as its pipeline cache tells; 0: it tells nothing
+};
+
 struct RenderStats {
     std::string device;
     std::vector<double> frame_ms; // tracing and shading, not loading or compiling
@@ -136,9 +147,14 @@ struct RenderStats {
     std::vector<double> frame_cpu_ms;
     WorkCounts work; // of one frame, the first
     TrimMode trim = TrimMode::Exact;
-    bool reused_last = false;              // it began from another picture's hits (RenderOptions::reuse_last)
-    uint64_t kd_bytes = 0;                 // of the kd-trees, in the mode kd; otherwise there are none
-    uint64_t border_bytes = 0;             // of the borders' cells, where lines or smoothed trims ask for them; else 0
+    bool reused_last = false;  // it began from another picture's hits (RenderOptions::reuse_last)
+    uint64_t kd_bytes = 0;     // of the kd-trees, in the mode kd; otherwise there are none
+    uint64_t border_bytes = 0; // of the borders' cells, where lines or smoothed trims ask for them; else 0
+    // Of the arrays that the picture needs: on a device all that are there so far, the pack's among them, without those
+    // in which bands come back; on the CPU those beside the pack's, without the threads' scratch and small records
+    uint64_t buffer_bytes = 0;
+    uint32_t dispatches = 0;               // of the last frame, on a device
+    std::vector<PipelineStats> pipelines;  // of the timed frames, on a device
     std::vector<TrimQueries> trim_queries; // of one frame, if asked for; on one thread in the order in which they came
 };
 

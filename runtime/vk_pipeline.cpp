@@ -4,6 +4,16 @@
 #include <vector>
 
 namespace trimray {
+namespace {
+
+uint64_t cache_bytes(const VulkanDevice& device, VkPipelineCache cache)
+{
+    size_t bytes = 0;
+    const VkResult result = device.vk().vkGetPipelineCacheData(device.handle(), cache, &bytes, nullptr);
+    return result == VK_SUCCESS ? bytes : 0;
+}
+
+} // namespace
 
 ComputePipeline::~ComputePipeline()
 {
@@ -18,7 +28,7 @@ ComputePipeline::~ComputePipeline()
 
 ComputePipeline::ComputePipeline(ComputePipeline&& other) noexcept
     : device_(std::exchange(other.device_, nullptr)), set_layout_(other.set_layout_), layout_(other.layout_),
-      pipeline_(other.pipeline_), pool_(other.pool_), set_(other.set_)
+      pipeline_(other.pipeline_), pool_(other.pool_), set_(other.set_), size_bytes_(other.size_bytes_)
 {
 }
 
@@ -30,6 +40,7 @@ ComputePipeline& ComputePipeline::operator=(ComputePipeline&& other) noexcept
     std::swap(pipeline_, other.pipeline_);
     std::swap(pool_, other.pool_);
     std::swap(set_, other.set_);
+    std::swap(size_bytes_, other.size_bytes_);
     return *this;
 }
 
@@ -97,7 +108,15 @@ Result<ComputePipeline> ComputePipeline::create(const VulkanDevice& device, std:
     info.stage.pName = "main";
     info.stage.pSpecializationInfo = &specialisation;
     info.layout = made.layout_;
-    result = vk.vkCreateComputePipelines(device.handle(), VK_NULL_HANDLE, 1, &info, nullptr, &made.pipeline_);
+    VkPipelineCache cache = VK_NULL_HANDLE;
+    const auto cache_info = vk_struct<VkPipelineCacheCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_CACHE_CREATE_INFO);
+    result = vk.vkCreatePipelineCache(device.handle(), &cache_info, nullptr, &cache);
+    if (result == VK_SUCCESS) {
+        const uint64_t empty_bytes = cache_bytes(device, cache);
+        result = vk.vkCreateComputePipelines(device.handle(), cache, 1, &info, nullptr, &made.pipeline_);
+        made.size_bytes_ = cache_bytes(device, cache) - empty_bytes;
+        vk.vkDestroyPipelineCache(device.handle(), cache, nullptr);
+    }
     vk.vkDestroyShaderModule(device.handle(), module, nullptr);
     if (result != VK_SUCCESS)
         return vk_failure("vkCreateComputePipelines", result);

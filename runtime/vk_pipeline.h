@@ -31,6 +31,9 @@ public:
     void dispatch(VkCommandBuffer commands, std::span<const std::byte> push, uint32_t groups_x,
                   uint32_t groups_y) const;
 
+    /// Of the driver's program, as a pipeline cache that holds it alone tells; 0: it tells nothing.
+    uint64_t size_bytes() const { return size_bytes_; }
+
 private:
     const VulkanDevice* device_ = nullptr;
     VkDescriptorSetLayout set_layout_ = VK_NULL_HANDLE;
@@ -38,6 +41,7 @@ private:
     VkPipeline pipeline_ = VK_NULL_HANDLE;
     VkDescriptorPool pool_ = VK_NULL_HANDLE;
     VkDescriptorSet set_ = VK_NULL_HANDLE;
+    uint64_t size_bytes_ = 0;
 };
 
 } // namespace trimray

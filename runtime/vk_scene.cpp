@@ -108,14 +108,13 @@ Status upload_arrays(VulkanDevice& device, std::span<const Array> arrays,
     return Done{};
 }
 
-} // namespace
-
-Specialisation specialisation(const EffectPlan& plan, bool count)
+// kFeature bits, but for kFeatureCount and kFeatureLate
+uint32_t plan_features(const EffectPlan& plan)
 {
     uint32_t features = 0;
     for (const auto& [wanted, feature] :
          {std::pair{plan.trims, kFeatureTrims}, std::pair{plan.rational, kFeatureRational},
-          std::pair{plan.rims, kFeatureRims}, std::pair{plan.shade, kFeatureShade}, std::pair{count, kFeatureCount},
+          std::pair{plan.rims, kFeatureRims}, std::pair{plan.shade, kFeatureShade},
           std::pair{plan.edges, kFeatureEdges}, std::pair{plan.stochastic, kFeatureStochastic},
           std::pair{plan.keeps_hits, kFeatureKept}, std::pair{plan.reuses_hits, kFeatureReuse},
           std::pair{plan.lit, kFeatureLights}, std::pair{plan.cut, kFeatureCut},
@@ -123,18 +122,43 @@ Specialisation specialisation(const EffectPlan& plan, bool count)
           std::pair{plan.layers, kFeatureLayers}, std::pair{plan.mirrors, kFeatureMirrors},
           std::pair{plan.environment, kFeatureEnvironment}})
         features |= wanted ? feature : 0u;
+    return features;
+}
+
+uint32_t plan_trims(const EffectPlan& plan)
+{
+    switch (plan.trim) {
+    case TrimMode::Sdf:
+        return kTrimByTexture;
+    case TrimMode::Hybrid:
+        return kTrimByBoth;
+    case TrimMode::Kd:
+        return kTrimByKd;
+    default:
+        return kTrimByCells;
+    }
+}
+
+} // namespace
+
+Specialisation specialisation(const EffectPlan& plan, bool count)
+{
+    const bool known = plan.specialised;
     Specialisation constants{};
-    constants[kSpecTrimMode] = plan.trim == TrimMode::Sdf      ? kTrimByTexture
-                               : plan.trim == TrimMode::Hybrid ? kTrimByBoth
-                               : plan.trim == TrimMode::Kd     ? kTrimByKd
-                                                               : kTrimByCells;
-    constants[kSpecKinds] = plan.kinds;
-    constants[kSpecFeatures] = features;
+    constants[kSpecTrimMode] = known ? plan_trims(plan) : uint32_t{kTrimByCells};
+    constants[kSpecKinds] = known ? plan.kinds : ~0u;
+    constants[kSpecFeatures] = (known ? plan_features(plan) : uint32_t{kFeatureLate}) | (count ? kFeatureCount : 0u);
     constants[kSpecStackSize] = plan.stack_size;
     constants[kSpecLocalFloats] = plan.local_floats;
     constants[kSpecIterationLimit] = plan.iteration_limit;
-    constants[kSpecMap] = static_cast<uint32_t>(plan.map);
+    constants[kSpecMap] = known ? static_cast<uint32_t>(plan.map) : uint32_t{kMapNone};
     return constants;
+}
+
+void decide_late(const EffectPlan& plan, FrameView& view)
+{
+    view.first_sample = plan_features(plan);
+    view.end_sample = static_cast<uint32_t>(plan.map) | plan_trims(plan) << 8;
 }
 
 Result<std::array<VulkanBuffer, kFrameBindings>> upload_scene(VulkanDevice& device, const PackImage& image)

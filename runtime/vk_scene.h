@@ -21,6 +21,9 @@ namespace trimray {
 using Specialisation = std::array<uint32_t, kFrameSpecs>;
 Specialisation specialisation(const EffectPlan& plan, bool count);
 
+/// Tells the view what a pipeline that is not specialised to it must know.
+void decide_late(const EffectPlan& plan, FrameView& view);
+
 /// The pack's arrays by binding (shaders/frame_layout.h); the bindings of a frame's own buffers stay empty.
 /// Fails: DeviceFailed.
 Result<std::array<VulkanBuffer, kFrameBindings>> upload_scene(VulkanDevice& device, const PackImage& image);

@@ -64,6 +64,15 @@ constexpr uint32_t kMostRetries = 4096;
 // Rays a pixel that one dispatch of light.comp casts: on the software driver a ray takes what the loop limit allows
 constexpr uint32_t kSamplesADispatch = 16, kSoftwareSamplesADispatch = 1;
 
+const char* shader_name(const uint32_t* spirv)
+{
+    return spirv == kPrimarySpirv  ? "primary"
+           : spirv == kCapsSpirv   ? "caps"
+           : spirv == kLightSpirv  ? "light"
+           : spirv == kMirrorSpirv ? "mirror"
+                                   : "blend";
+}
+
 // Whether any ray begins elsewhere than at the eye
 bool needs_free_rays(const RenderOptions& options, const EffectPlan& plan)
 {
@@ -158,6 +167,7 @@ private:
     Result<double> trace_frame(FrameView view, uint32_t rows_per_band, Frame* frame);
     void take_pixels(const FrameView& view, Frame& frame) const;
     void take_edges(const FrameView& view);
+    void describe(RenderStats& stats) const;
     double draw(const RenderOptions& options, Frame& frame);
 
     std::unique_ptr<VulkanDevice> device_; // first: everything below must be gone before it
@@ -195,6 +205,7 @@ private:
         ComputePipeline pipeline;
     };
     std::deque<MadePipeline> pipelines_; // pointers handed out stay good
+    uint32_t dispatches_ = 0;            // of the frame at hand
 };
 
 Status VulkanTracer::upload()
@@ -278,8 +289,10 @@ Result<ComputePipeline*> VulkanTracer::pipeline(std::span<const uint32_t> spirv,
 {
     RenderOptions traced = options;
     traced.trim = trim;
-    if (spirv.data() != kPrimarySpirv)
+    if (spirv.data() != kPrimarySpirv) {
         traced.look.map.map = SurfaceMap::None;
+        traced.specialise = true;
+    }
     const Specialisation constants = specialisation(effect_plan(facts_, traced, device_kind()), count);
     for (MadePipeline& made : pipelines_)
         if (made.spirv == spirv.data() && made.constants == constants)
@@ -517,6 +530,7 @@ Result<std::array<uint64_t, kFrameCounts>> VulkanTracer::read_counts()
 Result<double> VulkanTracer::time_dispatch(const ComputePipeline& pipeline, const FrameView& view, uint32_t groups_x,
                                            uint32_t groups_y)
 {
+    ++dispatches_;
     const VolkDeviceTable& vk = device_->vk();
     const auto start = std::chrono::steady_clock::now();
     const Status traced = device_->run([&](VkCommandBuffer commands) {
@@ -930,6 +944,20 @@ void VulkanTracer::take_edges(const FrameView& view)
     }
 }
 
+// What the device holds and runs for the picture at hand.
+void VulkanTracer::describe(RenderStats& stats) const
+{
+    const auto used = {use_.primary, use_.caps, use_.light, use_.mirror, use_.blend};
+    stats.buffer_bytes = layer_pixels_.size_bytes();
+    for (const VulkanBuffer& buffer : buffers_)
+        stats.buffer_bytes += buffer.size_bytes();
+    stats.dispatches = dispatches_;
+    for (const MadePipeline& made : pipelines_)
+        if (std::find(used.begin(), used.end(), &made.pipeline) != used.end())
+            stats.pipelines.push_back(
+                {shader_name(made.spirv), {made.constants.begin(), made.constants.end()}, made.pipeline.size_bytes()});
+}
+
 // The effects' pass over the frame, on the host. Returns milliseconds.
 double VulkanTracer::draw(const RenderOptions& options, Frame& frame)
 {
@@ -1034,6 +1062,8 @@ Result<Frame> VulkanTracer::render(const RenderOptions& options, RenderStats& st
         const std::array<float, 2> start = start_of_frame(frame);
         std::copy(start.begin(), start.end(), view.start);
     };
+    if (!plan.specialised)
+        decide_late(plan, view);
     choose_start(0);
     if (const Status none = forget_kept(); !none)
         return none.error();
@@ -1068,6 +1098,7 @@ Result<Frame> VulkanTracer::render(const RenderOptions& options, RenderStats& st
         // a software driver's frames are always read: only that shows what must be traced again
         const bool read = i + 1 == frames || device_->is_software() || has_effects(options);
         choose_start(i);
+        dispatches_ = 0;
         const Result<double> ms = trace_frame(view, rows_per_band, read ? &frame : nullptr);
         if (!ms)
             return ms.error();
@@ -1075,6 +1106,7 @@ Result<Frame> VulkanTracer::render(const RenderOptions& options, RenderStats& st
         stats.frame_ms.push_back(has_effects(options) ? *ms + draw(options, frame) : *ms);
     }
 
+    describe(stats);
     const Result<std::array<uint64_t, kFrameCounts>> counts = read_counts();
     if (!counts)
         return counts.error();

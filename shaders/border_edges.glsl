@@ -228,7 +228,7 @@ uvec2 find_edges(Hit hit, Ray eye_ray)
         measure_sides(m, reach, face, m.uv - m.reach_uv, m.uv + m.reach_uv);
     else
         measure_pieces(m, reach, patch.face, face);
-    if (trim_mode == kTrimByTexture && face.sdf_size != 0u) {
+    if (trims_by() == kTrimByTexture && face.sdf_size != 0u) {
         SdfFace sdf = sdf_face(face);
         if (in_texture(m.uv, 1.0f / sdf.scale)) {
             vec2 at = texture_border(sdf, m);

@@ -36,7 +36,8 @@ struct FrameView {
     uint alone;        // 1: each workgroup traces pixel retries[workgroup] of the band, with one of its invocations
     // of primary.comp and blend.comp: the layer's number; of mirror.comp: the reflection's;
     // of light.comp: what is gathered, a light's number or kGatherSky, and samples [first_sample, end_sample) of it; of
-    // caps.comp: the question's number
+    // caps.comp: the question's number.
+    // With kFeatureLate the samples are kFeature bits, and kMap | kTrimBy << 8
     uint gathered;
     uint first_sample;
     uint end_sample;
@@ -157,6 +158,9 @@ TRIMRAY_CONST uint kFeatureMirrors = 8192u;
 TRIMRAY_CONST uint kFeatureEnvironment = 16384u;
 // Camera::orthographic_mm: pixel (x, y) looks along w0 from eye + dx step_x + dy step_y, steps in mm
 TRIMRAY_CONST uint kFeatureParallel = 32768u;
+
+// primary.comp is not specialised to what the view's samples say (RenderOptions::specialise)
+TRIMRAY_CONST uint kFeatureLate = 0x80000000u;
 
 TRIMRAY_CONST uint kGatherSky = 0xffffffffu; // FrameView::gathered, of light.comp
 TRIMRAY_CONST uint kBlendAll = 0xffffffffu;  // ... of blend.comp: all layers are there

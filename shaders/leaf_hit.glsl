@@ -67,20 +67,20 @@ bool inside_trims(uint face_id, FaceRecord face, vec2 uv)
 {
     if (!has_feature(kFeatureTrims) || (face.flags & kFaceNaturalBorder) != 0u)
         return true;
-    if (trim_mode == kTrimByKd)
+    if (trims_by() == kTrimByKd)
         return inside_kd(kd_faces[face_id], uv);
     // a face without pieces has neither cells nor texture, and no inside
-    if ((trim_mode != kTrimByTexture && face.grid == 0u) || (trim_mode != kTrimByCells && face.sdf_size == 0u))
+    if ((trims_by() != kTrimByTexture && face.grid == 0u) || (trims_by() != kTrimByCells && face.sdf_size == 0u))
         return false;
     TrimFace trim = trim_face(face);
-    if (trim_mode == kTrimByTexture)
+    if (trims_by() == kTrimByTexture)
         return sdf_inside(sdf_distance(sdf_face(face), uv));
     // the cell's class takes one fetch and decides most; the texture's four come before the pieces
     uint word = fetch_cell(cell_index(trim, uv));
     bool inside = cell_says_inside(word);
     if (!cell_is_mixed(word))
         return inside;
-    if (trim_mode == kTrimByBoth) {
+    if (trims_by() == kTrimByBoth) {
         float distance_texels = sdf_distance(sdf_face(face), uv);
         if (abs(distance_texels) > face.sdf_band_texels)
             return sdf_inside(distance_texels);
@@ -115,7 +115,7 @@ bool lies_clear(FaceRecord face, vec2 uv, vec2 width)
 {
     if (!has_feature(kFeatureTrims) || (face.flags & kFaceNaturalBorder) != 0u)
         return true;
-    if ((trim_mode != kTrimByCells && trim_mode != kTrimByBoth) || face.grid == 0u)
+    if ((trims_by() != kTrimByCells && trims_by() != kTrimByBoth) || face.grid == 0u)
         return false;
     TrimFace trim = trim_face(face);
     vec2 lo = clamp(uv - width, vec2(0.0f), vec2(kUvBelowOne));

@@ -97,7 +97,7 @@ FramePixel hit_pixel(Hit hit, Ray eye_ray, uint band_pixel)
     result.instance = hit.instance;
     result.status = kPixelHit | (hit.doubt <= hit.past ? 0u : kPixelCertified);
     result.rgba = float[4](0.0f, 0.0f, 0.0f, 1.0f);
-    bool mapped = surface_map != kMapNone;
+    bool mapped = drawn_map() != kMapNone;
     MapColor map;
     if (mapped)
         map = map_hit(hit, instance, patch, face, eye_ray, normal, to_eye);
@@ -108,7 +108,7 @@ FramePixel hit_pixel(Hit hit, Ray eye_ray, uint band_pixel)
         if (mapped)
             material.color = float[3](map.color.x, map.color.y, map.color.z);
         vec3 color = vector(material.color);
-        if (mapped && !is_lit_map(surface_map)) {
+        if (mapped && !is_lit_map(drawn_map())) {
             if (has_feature(kFeatureLights))
                 lit_pixels[band_pixel].pixel = 0.0f;
         } else if (has_feature(kFeatureLights)) {

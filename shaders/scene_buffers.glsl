@@ -87,7 +87,11 @@ uint fetch_sdf_pair(uint first_word, uint at)
 
 vec3 vector(float v[3]) { return vec3(v[0], v[1], v[2]); }
 bool has_kind(uint kind) { return (kinds & (1u << kind)) != 0u; }
-bool has_feature(uint feature) { return (features & feature) != 0u; }
+// A program for every scene reads from the view what others are specialised to (RenderOptions::specialise).
+bool decides_late() { return (features & kFeatureLate) != 0u; }
+bool has_feature(uint feature) { return ((decides_late() ? features | view.first_sample : features) & feature) != 0u; }
+uint drawn_map() { return decides_late() ? view.end_sample & 0xffu : surface_map; }
+uint trims_by() { return decides_late() ? view.end_sample >> 8 : trim_mode; }
 
 // Work of this invocation. `iterations` bounds the loop iterations of the leaf at hand from above.
 uint node_visits = 0u;

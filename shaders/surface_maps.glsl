@@ -1,6 +1,6 @@
 // What a map draws at a hit, and what it measures there. The CPU tracer's way is runtime/cpu_maps.h.
 
-bool measures() { return is_curvature_map(surface_map) || surface_map == kMapDraft; }
+bool measures() { return is_curvature_map(drawn_map()) || drawn_map() == kMapDraft; }
 
 Derivatives bezier_derivatives_at(PatchRecord patch, bool rational, vec2 uv)
 {
@@ -75,7 +75,7 @@ MapColor map_hit(Hit hit, FrameInstance instance, PatchRecord patch, FaceRecord 
     point.to_eye = to_eye;
     point.normal_steps = PixelSteps(vec3(0.0f), vec3(0.0f));
     point.curvatures = curvatures_of(0.0f, 0.0f);
-    if (is_curvature_map(surface_map)) {
+    if (is_curvature_map(drawn_map())) {
         Curvatures k;
         if (is_bezier)
             k = curvatures_of_derivatives(s);
@@ -100,5 +100,5 @@ MapColor map_hit(Hit hit, FrameInstance instance, PatchRecord patch, FaceRecord 
     point.to_eye_steps = PixelSteps(vec3(0.0f), vec3(0.0f));
     if (!has_feature(kFeatureParallel))
         point.to_eye_steps = unit_steps(to_eye, steps, -1.0f / length(vector(view.w0) + eye_ray.across));
-    return map_color(surface_map, map_view, point);
+    return map_color(drawn_map(), map_view, point);
 }

@@ -72,8 +72,8 @@ def pack_of(path, folder, build):
     return pack
 
 
-def arguments(description, output, size, rounds):
-    """The command line's options; `output`, `size` and `rounds` are defaults."""
+def arguments(description, output, size, rounds, add=lambda parser: None):
+    """The command line's options; `output`, `size` and `rounds` are defaults, `add` adds more to the parser."""
     parser = argparse.ArgumentParser(description=description)
     parser.add_argument("inputs", nargs="+", type=pathlib.Path)
     parser.add_argument("-o", "--output", type=pathlib.Path, default=pathlib.Path(output))
@@ -81,6 +81,7 @@ def arguments(description, output, size, rounds):
     parser.add_argument("--size", default=size)
     parser.add_argument("--rounds", type=int, default=rounds)
     parser.add_argument("--threads", type=int, default=1)
+    add(parser)
     return parser.parse_args()
 
 

@@ -765,6 +765,50 @@ class Bench(CliTest):
         self.assertRegex(text, r"(?m)^stochastic +one +1 ")
         self.assertRegex(text, r"Certified frames cost [\d.]+ of")
 
+    def check_effects(self, device):
+        names = ["none", "edges", "hard-shadows", "draft", "unspecialised"]
+        options = ["bench", "effects", PACK, "--device", device, "--size", "48x36", "--effects", ",".join(reversed(names))]
+        report = self.json_of(*options, "--json", "--rounds", 1)
+        self.assertEqual((report["width"], report["height"], report["rounds"], report["threads"]), (48, 36, 1, 1))
+        [measured] = report["packs"]
+        rows = {row["effect"]: row for row in measured["effects"]}
+        self.assertEqual(list(rows), names)
+        for row in rows.values():
+            self.assertEqual(set(row), {"effect", "unsupported", "frame_ms", "time_to_none", "differing_pixels",
+                                        "buffer_bytes", "dispatches", "pipelines", "work"})
+            self.assertIsNone(row["unsupported"])
+            self.assertGreater(row["frame_ms"], 0)
+            self.assertGreater(row["time_to_none"], 0)
+        none = rows["none"]
+        self.assertEqual(none["time_to_none"], 1)
+        self.assertEqual(rows["unspecialised"]["differing_pixels"], 0)
+        self.assertEqual(rows["unspecialised"]["work"], none["work"])
+        self.assertEqual((none["work"]["free_rays"], none["work"]["edge_tests"]), (0, 0))
+        self.assertGreater(rows["hard-shadows"]["work"]["free_rays"], 0)
+        self.assertGreater(rows["edges"]["work"]["edge_tests"], 0)
+        for name in names[1:-1]:
+            self.assertGreater(rows[name]["differing_pixels"], 0, name)
+            self.assertGreater(rows[name]["buffer_bytes"], none["buffer_bytes"], name)
+        return rows
+
+    def test_effects_measures_each_effect_alone_on_the_cpu(self):
+        rows = self.check_effects("cpu")
+        self.assertEqual({(row["dispatches"], len(row["pipelines"])) for row in rows.values()}, {(0, 0)})
+        options = ["bench", "effects", PACK, "--size", "48x36", "--effects", "none,unspecialised"]
+        untimed = self.json_of(*options, "--json", "--rounds", 0)["packs"][0]["effects"]
+        self.assertEqual({(row["frame_ms"], row["time_to_none"]) for row in untimed}, {(None, None)})
+        self.assertRegex(self.ok(*options, "--rounds", 1).stdout, r"(?m)^unspecialised +[\d.]+ +[\d.]+ ")
+
+    def test_effects_measures_each_effect_alone_through_vulkan(self):
+        if run("bench", "effects", PACK, "--device", "vulkan", "--size", "16x16", "--effects", "none").returncode == 4:
+            self.skipTest("no Vulkan driver")
+        rows = self.check_effects("vulkan")
+        shaders = {name: [pipeline["shader"] for pipeline in row["pipelines"]] for name, row in rows.items()}
+        self.assertEqual(shaders.pop("hard-shadows"), ["primary", "light"])
+        self.assertEqual(set(map(tuple, shaders.values())), {("primary",)})
+        self.assertEqual(rows["unspecialised"]["dispatches"], rows["none"]["dispatches"])
+        self.assertGreater(rows["hard-shadows"]["dispatches"], rows["none"]["dispatches"])
+
     def test_moving_measures_pictures_with_and_without_the_last_ones_hits(self):
         options = ["bench", "moving", PACK, "--size", "48x36", "--frames", 2, "--degrees", 3]
         if run(*options).returncode == 4:
@@ -786,6 +830,7 @@ class Bench(CliTest):
     def test_errors_have_their_exit_codes(self):
         self.fails(1, "bench", says=["bench", "subcommand"])
         self.fails(1, "bench", "moving", PACK, "--frames", "0", says=["--frames"])
+        self.fails(1, "bench", "effects", PACK, "--effects", "none,mirrors", says=["--effects", "'mirror'"])
         self.fails(1, "bench", "moving", PACK, "--device", "gpu", says=["--device", "vulkan"])
         self.fails(4, "bench", "moving", PACK, "--device", "cpu", "--size", "32x24", says=["reuses nothing", "--device vulkan"])
         self.fails(1, "bench", "closest", says=["bench closest", "PACK"])

@@ -169,6 +169,19 @@ TEST(effect_plan, says_what_tracers_specialise_themselves_from)
     EXPECT_EQ(plan_of(image, options, DeviceKind::Vulkan).iteration_limit, 0u);
 }
 
+TEST(effect_plan, has_every_scenes_sizes_where_tracers_are_not_to_specialise_themselves)
+{
+    RenderOptions options;
+    const EffectPlan own = plan_of(bare_plane(), options, DeviceKind::SoftwareVulkan);
+    options.specialise = false;
+    const EffectPlan plan = plan_of(bare_plane(), options, DeviceKind::SoftwareVulkan);
+    EXPECT_TRUE(own.specialised);
+    EXPECT_FALSE(plan.specialised);
+    EXPECT_GT(plan.stack_size, own.stack_size);
+    EXPECT_GT(plan.local_floats, own.local_floats);
+    EXPECT_LT(plan.iteration_limit, own.iteration_limit);
+}
+
 /// Asks for one thing.
 struct LookCase {
     const char* name;
