@@ -262,8 +262,9 @@ TEST(materials_traced, instruction_sets_and_threads_give_the_same_bits)
     options.look.mirror_depth = 2;
     const Frame best = draw(scene, options).frame;
     for (const char* instruction_set : {"avx2", "sse4"}) {
-        if (make_cpu_tracer(scene, instruction_set).ok())
-            EXPECT_TRUE(same_bits(best.rgba, draw(scene, options, instruction_set).frame.rgba)) << instruction_set;
+        if (!make_cpu_tracer(scene, instruction_set).ok()) // a build may leave some out
+            continue;
+        EXPECT_TRUE(same_bits(best.rgba, draw(scene, options, instruction_set).frame.rgba)) << instruction_set;
     }
     options.threads = 1;
     EXPECT_TRUE(same_bits(best.rgba, draw(scene, options).frame.rgba));
