@@ -61,24 +61,26 @@ public:
         // the eye's direction first: what it meets next has the cap's colour. A second one must agree, or a third
         // decides
         uint yes[kInsideQuestions] = {};
-        uint open = lane_bits(asked);
+        uint open = lane_bits(asked), lost = 0;
         const uint all = open;
         for (uint question = 0; question < kInsideQuestions && open != 0; ++question) {
             rays.alive = lanes_of(open);
             rays.direction = question == 0 ? ahead : real3(inside_direction(question));
             yes[question] = ask(rays, open, instances, leaves);
+            lost |= crossings_.lost;
             if (question == 1)
                 open &= yes[0] ^ yes[1];
         }
         const uint disagree = (yes[0] ^ yes[1]) & all;
         const uint inside = (yes[0] & yes[1]) | (disagree & yes[2]);
         caps.here = lanes_of(inside);
-        caps.doubtful = lanes_of(disagree);
+        caps.doubtful = lanes_of(disagree | lost);
         describe(caps, inside, rays, ahead, instances, leaves);
+        const real certain(job_.stochastic ? -kHuge : kHuge); // plain Newton claims nothing
         hit.best = select(caps.here, caps.past, hit.best);
         hit.leaf = select(caps.here, integer(~0u), hit.leaf);
         hit.instance = select(caps.here, caps.instance, hit.instance);
-        hit.doubt = select(caps.doubtful, real(-kHuge), select(caps.here, real(kHuge), hit.doubt));
+        hit.doubt = select(caps.doubtful, real(-kHuge), select(caps.here, certain, hit.doubt));
         return caps;
     }
 
@@ -88,6 +90,7 @@ private:
     {
         Crossings& crossings = crossings_;
         std::fill_n(crossings.count, kLanes, 0u);
+        crossings.lost = 0;
         crossings.per_mm = job_.places->per_mm;
         walk_.trace(rays, false, &crossings);
         uint inside = 0;

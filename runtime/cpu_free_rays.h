@@ -42,6 +42,7 @@ struct Crossings {
     uint what[kLanes][kMostCrossings]; // instance << 1 | kCrossingLeaves
     uint leaf[kLanes][kMostCrossings];
     uint count[kLanes];
+    uint lost; // lanes that crossed more than are kept
 };
 
 /// Two hits of one instance that both enter or both leave within `apart` are one: faces overlap there.
@@ -59,8 +60,12 @@ struct Crossings {
         bool known = false;
         for (uint i = 0; i < count && !known; ++i)
             known = crossings.what[lane][i] == what && std::abs(crossings.at[lane][i] - s[lane]) <= slack[lane];
-        if (known || count == kMostCrossings)
+        if (known)
             continue;
+        if (count == kMostCrossings) {
+            crossings.lost |= 1u << lane;
+            continue;
+        }
         crossings.at[lane][count] = s[lane];
         crossings.what[lane][count] = what;
         crossings.leaf[lane][count] = leaf.leaf;

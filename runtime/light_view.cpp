@@ -11,9 +11,6 @@ namespace {
 
 using Vec3 = std::array<double, 3>;
 
-constexpr uint32_t kMostSamples = 4096;
-constexpr uint32_t kMostReflections = 8;
-
 Vec3 scaled(const Vec3& v, double s)
 {
     return {v[0] * s, v[1] * s, v[2] * s};
@@ -130,20 +127,21 @@ Status check_lights(const SceneLook& look)
     for (size_t i = 0; i < look.lights.size(); ++i)
         if (const Status valid = check_light(look.lights[i], i); !valid.ok())
             return valid;
-    if (look.light_samples == 0 || look.light_samples > kMostSamples)
+    if (look.light_samples == 0 || look.light_samples > kMostRaysAPixel)
         return Error{ErrorCode::Usage, "light samples",
-                     fmt::format("expected 1 to {}, found {}", kMostSamples, look.light_samples)};
-    if (look.occlusion.samples > kMostSamples)
+                     fmt::format("expected 1 to {}, found {}", kMostRaysAPixel, look.light_samples)};
+    if (look.occlusion.samples > kMostRaysAPixel)
         return Error{ErrorCode::Usage, "ambient occlusion",
-                     fmt::format("at most {} rays a pixel, found {}", kMostSamples, look.occlusion.samples)};
+                     fmt::format("at most {} rays a pixel, found {}", kMostRaysAPixel, look.occlusion.samples)};
     if (!(look.occlusion.reach_mm > 0))
         return Error{ErrorCode::Usage, "ambient occlusion",
                      fmt::format("its reach must be above 0 mm, found {}", look.occlusion.reach_mm)};
-    if (look.sky && !(*look.sky >= 0 && *look.sky <= 100))
-        return Error{ErrorCode::Usage, "sky", fmt::format("its strength must be in [0, 100], found {}", *look.sky)};
-    if (look.mirror_depth > kMostReflections)
+    if (look.sky && !(*look.sky >= 0 && double(*look.sky) <= kMostSky))
+        return Error{ErrorCode::Usage, "sky",
+                     fmt::format("its strength must be in [0, {}], found {}", kMostSky, *look.sky)};
+    if (look.mirror_depth > kMostMirrorDepth)
         return Error{ErrorCode::Usage, "mirror depth",
-                     fmt::format("expected at most {}, found {}", kMostReflections, look.mirror_depth)};
+                     fmt::format("expected at most {}, found {}", kMostMirrorDepth, look.mirror_depth)};
     return Done{};
 }
 

@@ -11,6 +11,11 @@
 
 namespace trimray {
 
+// Bounds of what a scene may ask for
+constexpr uint32_t kMostRaysAPixel = 4096; // to each light, and of ambient occlusion
+constexpr uint32_t kMostMirrorDepth = 8;
+constexpr double kMostSky = 100;
+
 /// The rays of a picture, world mm: pixel (x, y) from its middle sees eye + tau (w0 + x step_x + y step_y), |w0| = 1.
 struct ViewRays {
     std::array<double, 3> eye_mm, w0, step_x, step_y;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "format/result.h"
+#include "runtime/light_view.h"
 #include "runtime/scene_json.h"
 #include "runtime/scene_look.h"
 #include "runtime/tracer.h"
@@ -49,9 +50,6 @@ struct SceneRequest {
 };
 
 constexpr uint32_t kMostSamples = 16;      // N of N x N a pixel
-constexpr uint32_t kMostRaysAPixel = 4096; // to each light, and of ambient occlusion
-constexpr uint32_t kMostMirrorDepth = 8;
-constexpr double kMostSky = 100;
 constexpr size_t kMostMaterialRules = 256; // with the command line's; lights: kMostLights (shaders/light_layout.h)
 
 /// Reads what a tree says into `request`, over what is there. Lights and section planes take the place of those there,

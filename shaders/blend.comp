@@ -15,6 +15,7 @@
 
 #include "shaders/environment.glsl"
 #include "shaders/places.glsl"
+#include "shaders/band_pixels.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
@@ -55,11 +56,11 @@ void finish(uint band_pixel, vec2 pixel)
 
 void main()
 {
-    uvec2 at = gl_GlobalInvocationID.xy;
-    if (at.x >= view.width || at.y >= view.row_count)
+    uvec2 at;
+    if (!is_active(at))
         return;
-    vec2 pixel = vec2(float(at.x) + 0.5f - view.middle[0], float(at.y + view.first_row) + 0.5f - view.middle[1]);
-    uint band_pixel = at.y * view.width + at.x;
+    vec2 pixel = pixel_at(at);
+    uint band_pixel = band_index(at);
     if (view.gathered == kBlendAll)
         finish(band_pixel, pixel);
     else

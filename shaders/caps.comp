@@ -7,44 +7,8 @@
 #extension GL_KHR_shader_subgroup_arithmetic : require
 #extension GL_KHR_shader_subgroup_basic : require
 
-#include "format/kd_layout.h"
-#include "shaders/frame_layout.h"
-#include "shaders/light_layout.h"
-#include "shaders/material_layout.h"
-#include "shaders/section_layout.h"
-// first: the formulas fetch through it, and they make `scalar`, a layout there, a type
-#include "shaders/scene_buffers.glsl"
-
-#include "shaders/shared/bezier.h"
-#include "shaders/shared/bvh_node.h"
-#include "shaders/shared/language.h"
-#include "shaders/shared/leaf_box.h"
-#include "shaders/shared/leaf_proof.h"
-#include "shaders/shared/leaf_start.h"
-#include "shaders/shared/light.h"
-#include "shaders/shared/precision.h"
-#include "shaders/shared/quadric.h"
-#include "shaders/shared/rim.h"
-#include "shaders/shared/section.h"
-#include "shaders/shared/torus.h"
-#include "shaders/shared/trim_kd.h"
-#include "shaders/shared/trim_lookup.h"
-
-#include "shaders/materials.glsl"
 #define TRIMRAY_COLLECTS
-#include "shaders/ray_types.glsl"
-#include "shaders/free_rays.glsl"
-#include "shaders/crossings.glsl"
-#include "shaders/leaf_hit.glsl"
-#include "shaders/walk.glsl"
-#include "shaders/places.glsl"
-#include "shaders/light.glsl"
-#include "shaders/section.glsl"
-#include "shaders/work_counts.glsl"
-
-layout(local_size_x = 8, local_size_y = 8) in;
-
-uint free_ray_count = 0u;
+#include "shaders/free_pass.glsl"
 
 // The nearest crossing out of an instance that is left more often than it is entered
 void next_left(inout CapState cap)
@@ -71,6 +35,8 @@ bool ask(vec2 pixel, float past, inout CapState cap)
     ++free_ray_count;
     if (!walk(ray, Guess(kNoLeaf, 0u), hit))
         return false;
+    if (crossings_lost)
+        cap.inside |= kCapUnsure;
     if (crossings_out(true, 0u) <= 0)
         return true;
     cap.inside |= 1u << view.gathered;
@@ -100,9 +66,11 @@ vec3 cap_color(CapState cap, SectionPlaneView plane, vec2 at, vec3 to_eye, float
 
 void write_cap(uint band_pixel, vec2 pixel, CutSpan span, CapState cap)
 {
-    bool agreed = (cap.inside & 3u) == 0u || (cap.inside & 3u) == 3u;
-    if (bitCount(cap.inside) < 2) {
-        if (!agreed)
+    uint answers = cap.inside & ~kCapUnsure;
+    bool agreed = (answers & 3u) == 0u || (answers & 3u) == 3u;
+    bool certain = agreed && answers == cap.inside && !has_feature(kFeatureStochastic);
+    if (bitCount(answers) < 2) {
+        if (!certain)
             pixels[band_pixel].status &= ~kPixelCertified;
         return;
     }
@@ -122,7 +90,7 @@ void write_cap(uint band_pixel, vec2 pixel, CutSpan span, CapState cap)
     result.uv_face = float[2](at.x / places.per_mm, at.y / places.per_mm);
     result.face = kCapFace - span.plane;
     result.instance = cap.instance;
-    result.status = kPixelHit | (agreed ? kPixelCertified : 0u);
+    result.status = kPixelHit | (certain ? kPixelCertified : 0u);
     result.rgba = float[4](0.0f, 0.0f, 0.0f, 1.0f);
     if (has_feature(kFeatureShade)) {
         vec3 seen;
@@ -145,23 +113,18 @@ void write_cap(uint band_pixel, vec2 pixel, CutSpan span, CapState cap)
 
 void main()
 {
-    uvec2 at = gl_GlobalInvocationID.xy;
-    bool active_here = at.x < view.width && at.y < view.row_count;
-    if (view.alone != 0u) {
-        uint retry = retries[gl_WorkGroupID.x];
-        at = uvec2(retry % view.width, retry / view.width);
-        active_here = gl_LocalInvocationIndex == 0u;
-    }
+    uvec2 at;
+    bool active_here = is_active(at);
     if (active_here) {
-        vec2 pixel = vec2(float(at.x) + 0.5f - view.middle[0], float(at.y + view.first_row) + 0.5f - view.middle[1]);
-        uint band_pixel = at.y * view.width + at.x;
+        vec2 pixel = pixel_at(at);
+        uint band_pixel = band_index(at);
         CutSpan span = cut_span(pixel);
         if (span.plane != kNoPlane && span.begin < span.end) {
             CapState cap = CapState(0u, 0u, kNoLeaf);
             if (view.gathered > 0u)
                 cap = caps[band_pixel];
             bool last = view.gathered + 1u == kInsideQuestions;
-            bool disagree = cap.inside == 1u || cap.inside == 2u;
+            bool disagree = (cap.inside & 3u) == 1u || (cap.inside & 3u) == 2u;
             bool complete = true;
             if (!last || disagree)
                 complete = ask(pixel, span.begin, cap);
@@ -170,14 +133,8 @@ void main()
                 if (last)
                     write_cap(band_pixel, pixel, span, cap);
             } else
-                stopped[atomicAdd(stopped_count, 1u)] = band_pixel;
+                cast_again(band_pixel);
         }
     }
-    if (has_feature(kFeatureCount)) {
-        tally(kCountNodes, node_visits);
-        tally(kCountFreeRays, free_ray_count);
-        tally(kCountFreeLeaves, leaf_visits);
-        tally(kCountNewton, newton_steps);
-        tally(kCountCurves, curve_tests);
-    }
+    tally_free_work();
 }

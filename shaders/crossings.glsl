@@ -4,6 +4,7 @@ float crossing_at[kMostCrossings];
 uint crossing_what[kMostCrossings]; // instance << 1 | kCrossingLeaves
 uint crossing_leaf[kMostCrossings];
 uint crossing_count = 0u;
+bool crossings_lost = false; // there were more than are kept
 
 // Two hits of one instance that both enter or both leave within the face's tolerance are one: faces overlap there.
 void collect_crossing(float at, float slack, bool leaves_it, float tolerance_mm, uint leaf, uint instance)
@@ -14,8 +15,10 @@ void collect_crossing(float at, float slack, bool leaves_it, float tolerance_mm,
         if (crossing_what[i] == what && abs(crossing_at[i] - at) <= apart)
             return;
     iterations += crossing_count;
-    if (crossing_count == kMostCrossings)
+    if (crossing_count == kMostCrossings) {
+        crossings_lost = true;
         return;
+    }
     crossing_at[crossing_count] = at;
     crossing_what[crossing_count] = what;
     crossing_leaf[crossing_count] = leaf;

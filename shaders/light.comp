@@ -6,42 +6,7 @@
 #extension GL_KHR_shader_subgroup_arithmetic : require
 #extension GL_KHR_shader_subgroup_basic : require
 
-#include "format/kd_layout.h"
-#include "shaders/frame_layout.h"
-#include "shaders/light_layout.h"
-#include "shaders/material_layout.h"
-#include "shaders/section_layout.h"
-// first: the formulas fetch through it, and they make `scalar`, a layout there, a type
-#include "shaders/scene_buffers.glsl"
-
-#include "shaders/shared/bezier.h"
-#include "shaders/shared/bvh_node.h"
-#include "shaders/shared/language.h"
-#include "shaders/shared/leaf_box.h"
-#include "shaders/shared/leaf_proof.h"
-#include "shaders/shared/leaf_start.h"
-#include "shaders/shared/light.h"
-#include "shaders/shared/precision.h"
-#include "shaders/shared/quadric.h"
-#include "shaders/shared/rim.h"
-#include "shaders/shared/section.h"
-#include "shaders/shared/torus.h"
-#include "shaders/shared/trim_kd.h"
-#include "shaders/shared/trim_lookup.h"
-
-#include "shaders/materials.glsl"
-#include "shaders/ray_types.glsl"
-#include "shaders/free_rays.glsl"
-#include "shaders/leaf_hit.glsl"
-#include "shaders/walk.glsl"
-#include "shaders/places.glsl"
-#include "shaders/light.glsl"
-#include "shaders/section.glsl"
-#include "shaders/work_counts.glsl"
-
-layout(local_size_x = 8, local_size_y = 8) in;
-
-uint free_ray_count = 0u;
+#include "shaders/free_pass.glsl"
 
 vec2 sample_at(uint index, uvec2 picture_at)
 {
@@ -98,15 +63,10 @@ void main()
 {
     any_hit = true;
     rims_cut = true;
-    uvec2 at = gl_GlobalInvocationID.xy;
-    bool active_here = at.x < view.width && at.y < view.row_count;
-    if (view.alone != 0u) {
-        uint retry = retries[gl_WorkGroupID.x];
-        at = uvec2(retry % view.width, retry / view.width);
-        active_here = gl_LocalInvocationIndex == 0u;
-    }
+    uvec2 at;
+    bool active_here = is_active(at);
     if (active_here) {
-        uint band_pixel = at.y * view.width + at.x;
+        uint band_pixel = band_index(at);
         LitPixel point = lit_pixels[band_pixel];
         if (point.pixel > 0.0f) {
             uvec2 picture_at = uvec2(at.x, at.y + view.first_row);
@@ -120,14 +80,8 @@ void main()
                 for (uint i = 0u; i < 3u; ++i)
                     pixels[band_pixel].rgba[i] += light[i];
             } else
-                stopped[atomicAdd(stopped_count, 1u)] = band_pixel;
+                cast_again(band_pixel);
         }
     }
-    if (has_feature(kFeatureCount)) {
-        tally(kCountNodes, node_visits);
-        tally(kCountFreeRays, free_ray_count);
-        tally(kCountFreeLeaves, leaf_visits);
-        tally(kCountNewton, newton_steps);
-        tally(kCountCurves, curve_tests);
-    }
+    tally_free_work();
 }

@@ -48,6 +48,7 @@
 #include "shaders/light.glsl"
 #include "shaders/section.glsl"
 #include "shaders/surface_maps.glsl"
+#include "shaders/band_pixels.glsl"
 #include "shaders/work_counts.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
@@ -126,15 +127,10 @@ FramePixel hit_pixel(Hit hit, Ray eye_ray, uint band_pixel)
 
 void main()
 {
-    uvec2 at = gl_GlobalInvocationID.xy;
-    bool active_here = at.x < view.width && at.y < view.row_count;
-    if (view.alone != 0u) {
-        uint retry = retries[gl_WorkGroupID.x];
-        at = uvec2(retry % view.width, retry / view.width);
-        active_here = gl_LocalInvocationIndex == 0u;
-    }
+    uvec2 at;
+    bool active_here = is_active(at);
     if (active_here) {
-        vec2 pixel = vec2(float(at.x) + 0.5f - view.middle[0], float(at.y + view.first_row) + 0.5f - view.middle[1]);
+        vec2 pixel = pixel_at(at);
         Ray eye_ray = Ray(pixel, pixel.x * vector(view.step_x) + pixel.y * vector(view.step_y));
         uint picture_pixel = (view.first_row + at.y) * view.width + at.x;
         Hit before = Hit(kHuge, 0.0f, vec2(0.0f), vec2(0.0f), 0xffffffffu, 0xffffffffu, kHuge, false, false, 0.0f);
@@ -176,7 +172,7 @@ void main()
         }
         if (has_feature(kFeatureReuse) && is_first_layer())
             keep_hit(picture_pixel, hit, eye_ray.across);
-        uint band_pixel = at.y * view.width + at.x;
+        uint band_pixel = band_index(at);
         FramePixel result = miss_pixel(hit.doubt < kHuge);
         if (hit.past < kHuge)
             result = hit_pixel(hit, eye_ray, band_pixel);

@@ -47,9 +47,11 @@ TRIMRAY_CONST uint kMostCrossings = 48u; // of one ray; with more, what is insid
 TRIMRAY_CONST uint kInsideQuestions = 3u; // directions that are asked whether a point is inside, the last where the
                                           // first two disagree
 
+TRIMRAY_CONST uint kCapUnsure = 8u;
+
 // What is known of a pixel's cap while caps.comp asks its questions
 struct CapState {
-    uint inside;   // bit i: question i said so
+    uint inside;   // bit i: question i said so; kCapUnsure: a ray crossed more than kMostCrossings
     uint instance; // whose inside it is, and the leaf that the ray leaves it through; kNoLeaf: not known
     uint leaf;
 };

@@ -1,4 +1,5 @@
 // Section planes and their caps against closed forms, on both tracers; and what both tracers make of the same scene.
+#include "shaders/section_layout.h"
 #include "tests/closed_forms.h"
 #include "tests/compare_frames.h"
 
@@ -237,6 +238,31 @@ TEST_P(section, mirrored_copies_have_caps_too)
     const PixelRays rays(options);
     for (size_t i = 0; i < frame->face.size(); ++i) {
         ASSERT_TRUE(!is_cap(*frame, i) || frame->instance[i] == (in_plane(options, rays, i)[0] < 0)) << i;
+    }
+}
+
+/// A ray keeps so many crossings only; what depends on the others is not certain.
+TEST_P(section, more_crossings_than_are_kept_leave_nothing_certain)
+{
+    const SectionPlane plane{{0, 0, 0}, {0, 0, 1}};
+    for (const size_t boxes : {size_t(kMostCrossings / 2 - 2), size_t(kMostCrossings)}) {
+        const auto stack = made([&](TracedScene& s) {
+            for (size_t i = 0; i < boxes; ++i)
+                add_box(s, {0, 0, -1 - 0.25 * double(i)}, {8, 8, 0.08});
+        });
+        const RenderOptions options = straight_at(plane, 8, vulkan() ? 24 : 64, true);
+        const auto drawn = drawn_by(vulkan(), stack, options);
+        if (!drawn)
+            return;
+        const Frame& frame = drawn->frame;
+        const size_t pixels = frame.face.size();
+        EXPECT_EQ(size_t(std::count(frame.face.begin(), frame.face.end(), -1)), 0u);
+        const size_t certain = size_t(std::count(frame.certified.begin(), frame.certified.end(), 1));
+        if (2 * boxes <= kMostCrossings) {
+            EXPECT_EQ(cap_count(frame), 0u);
+            EXPECT_EQ(certain, pixels);
+        } else
+            EXPECT_EQ(certain, 0u);
     }
 }
 
