@@ -43,6 +43,23 @@ std::string common_degrees(const PackFacts& facts, bool rational)
     return text;
 }
 
+/// The degree in one direction that all Bezier patches share; 0: none.
+uint32_t common_degree(const PackFacts& facts, uint32_t DegreeCount::*direction)
+{
+    if (facts.degrees.empty())
+        return 0;
+    const uint32_t first = facts.degrees[0].*direction;
+    const bool shared =
+        std::ranges::all_of(facts.degrees, [&](const DegreeCount& degree) { return degree.*direction == first; });
+    return shared ? first : 0;
+}
+
+// " 3 in u", or nothing
+std::string of_direction(uint32_t degree, const char* direction)
+{
+    return degree > 0 ? fmt::format(" {} in {}", degree, direction) : "";
+}
+
 // What the tracer meets are patches; a file's cylinder may have been converted to Bezier patches.
 void add_surfaces(const PackFacts& facts, std::vector<EffectItem>& items)
 {
@@ -302,6 +319,10 @@ EffectPlan effect_plan(const PackFacts& facts, const RenderOptions& options, Dev
     plan.environment = (plan.look & kLookEnvironment) != 0;
     plan.specialised = options.specialise;
     plan.stack_size = plan.specialised ? facts.stack_size : kLargestStackSize;
+    if (vulkan && plan.specialised) {
+        plan.degree_u = common_degree(facts, &DegreeCount::degree_u);
+        plan.degree_v = common_degree(facts, &DegreeCount::degree_v);
+    }
     if (device == DeviceKind::SoftwareVulkan) {
         const uint32_t net_floats = plan.specialised ? facts.largest_net_floats : kMostLocalFloats;
         plan.local_floats = facts.largest_net_floats <= kMostLocalFloats ? net_floats : 0;
@@ -321,6 +342,11 @@ EffectPlan effect_plan(const PackFacts& facts, const RenderOptions& options, Dev
         add_drawing(facts, options, items);
         add_look(plan.look, options.look, items);
     }
+    if (plan.degree_u > 0 || plan.degree_v > 0)
+        items.push_back({"known-degrees", fmt::format("all Bezier patches are of degree{}{}: loops over their control "
+                                                      "points are of known length",
+                                                      of_direction(plan.degree_u, "u"),
+                                                      of_direction(plan.degree_v, "v"))});
     if (plan.local_floats > 0)
         items.push_back({"local-nets", fmt::format("a software driver: control points are copied beside each ray, {} "
                                                    "floats for the largest patch",

@@ -151,6 +151,8 @@ Specialisation specialisation(const EffectPlan& plan, bool count)
     constants[kSpecStackSize] = plan.stack_size;
     constants[kSpecLocalFloats] = plan.local_floats;
     constants[kSpecIterationLimit] = plan.iteration_limit;
+    constants[kSpecDegreeU] = plan.degree_u;
+    constants[kSpecDegreeV] = plan.degree_v;
     constants[kSpecMap] = known ? static_cast<uint32_t>(plan.map) : uint32_t{kMapNone};
     return constants;
 }

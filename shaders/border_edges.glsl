@@ -30,11 +30,9 @@ NearestBorder nearest_border;
 SurfacePoint bezier_at(PatchRecord patch, vec2 uv_face)
 {
     vec2 uv = (uv_face - vec2(patch.uv_offset[0], patch.uv_offset[1])) / vec2(patch.uv_scale[0], patch.uv_scale[1]);
-    uint degree_u = (patch.shape >> 8) & 0xffu;
-    uint degree_v = (patch.shape >> 16) & 0xffu;
-    bool rational = has_feature(kFeatureRational) && (patch.shape & kShapeRational) != 0u;
-    iterations += 1u + bezier_iterations(degree_u, degree_v);
-    return bezier_point(patch.first_control_point, int(degree_u), int(degree_v), rational, uv);
+    PatchShape shape = patch_shape(patch.shape);
+    iterations += 1u + point_iterations(shape);
+    return patch_point(patch.first_control_point, shape, uv);
 }
 
 Derivatives native_derivatives(uint kind, PatchRecord patch, vec3 p)

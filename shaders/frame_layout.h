@@ -133,7 +133,9 @@ TRIMRAY_CONST uint kSpecStackSize = 3u;
 TRIMRAY_CONST uint kSpecLocalFloats = 4u; // control points are copied into an array of so many floats; 0: they are not
 TRIMRAY_CONST uint kSpecIterationLimit = 5u; // loop iterations a subgroup may run; 0: no limit
 TRIMRAY_CONST uint kSpecMap = 6u;            // kMap
-TRIMRAY_CONST uint kFrameSpecs = 7u;
+TRIMRAY_CONST uint kSpecDegreeU = 7u;        // of all Bezier patches; 0: they differ
+TRIMRAY_CONST uint kSpecDegreeV = 8u;
+TRIMRAY_CONST uint kFrameSpecs = 9u;
 
 TRIMRAY_CONST uint kTrimByCells = 0u;
 TRIMRAY_CONST uint kTrimByTexture = 1u;

@@ -30,6 +30,7 @@
 #ifdef TRIMRAY_COLLECTS
 #include "shaders/crossings.glsl"
 #endif
+#include "shaders/patch_point.glsl"
 #include "shaders/leaf_hit.glsl"
 #include "shaders/walk.glsl"
 #include "shaders/places.glsl"

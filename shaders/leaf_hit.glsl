@@ -296,25 +296,9 @@ void native_hit(PatchRay ray, PatchRecord patch, FaceRecord face, uint kind, uin
     iterations += 4u;
 }
 
-// Loop iterations of one bezier_point, as its loops stand
-uint bezier_iterations(uint degree_u, uint degree_v)
-{
-    return degree_u * (degree_u + 1u) / 2u + degree_v * (degree_v + 1u) / 2u + (degree_u + 1u) * (degree_v + 2u);
-}
-
-void copy_control_points(PatchRecord patch, uint count)
-{
-    local_first = patch.first_control_point;
-    for (uint i = 0u; i < count && i < local_floats; ++i)
-        local_points[i] = control_points[local_first + i];
-    iterations += count;
-}
-
 struct NewtonPatch {
     uint first_control_point;
-    int degree_u;
-    int degree_v;
-    bool rational;
+    PatchShape shape;
     float enough;   // residual of the last step, patch units
     float rounding; // residual that rounding alone may leave, patch units
     uint work;      // loop iterations of a step
@@ -324,7 +308,7 @@ struct NewtonPatch {
 SurfacePoint evaluate(NewtonPatch newton, vec2 uv)
 {
     iterations += newton.work;
-    return bezier_point(newton.first_control_point, newton.degree_u, newton.degree_v, newton.rational, uv);
+    return patch_point(newton.first_control_point, newton.shape, uv);
 }
 
 // Where Newton's iteration ended
@@ -363,7 +347,7 @@ void offer_end(PatchRay ray, PatchRecord patch, FaceRecord face, NewtonPatch new
     float footprint = ray.pixel * spread(ray.anchor + root.t);
     float off_by = kRaysCertify ? more_than_hair(footprint, newton.rounding) : 0.0f;
     // where weights may not stay positive beyond a side, it is not certain that the patch goes on
-    bool unsure = on_patch && newton.rational && is_beyond_sides(root.uv);
+    bool unsure = on_patch && newton.shape.rational && is_beyond_sides(root.uv);
     if (off_by > 0.0f) {
         vec2 patch_blur = root_blur(search.seen, off_by);
         uv_blur = patch_blur * abs(vec2(patch.uv_scale[0], patch.uv_scale[1]));
@@ -420,23 +404,18 @@ void bezier_hit(PatchRay ray, PatchRecord patch, FaceRecord face, LeafBox box, f
                 bool rims, inout Hit hit)
 {
     NewtonPatch newton;
-    uint degree_u = (patch.shape >> 8) & 0xffu;
-    uint degree_v = (patch.shape >> 16) & 0xffu;
     newton.first_control_point = patch.first_control_point;
-    newton.degree_u = int(degree_u);
-    newton.degree_v = int(degree_v);
-    newton.rational = has_feature(kFeatureRational) && (patch.shape & kShapeRational) != 0u;
-    if (local_floats > 0u)
-        copy_control_points(patch, (degree_u + 1u) * (degree_v + 1u) * (newton.rational ? 4u : 3u));
+    newton.shape = patch_shape(patch.shape);
+    copy_control_points(patch, newton.shape);
     newton.planes = ray_planes(ray.origin, ray.direction);
     newton.enough = last_residual(view.error_px * ray.width);
-    newton.rounding = patch_rounding(newton.degree_u, newton.degree_v);
-    newton.work = 1u + bezier_iterations(degree_u, degree_v);
+    newton.rounding = patch_rounding(newton.shape.degree_u, newton.shape.degree_v);
+    newton.work = 1u + point_iterations(newton.shape);
     if (has_feature(kFeatureStochastic)) {
         newton_once(ray, patch, face, box, newton, leaf, instance, rims, hit);
         return;
     }
-    vec2 lost = derivative_loss(box, vec2(patch.param[0], patch.param[1]), newton.degree_u, newton.degree_v);
+    vec2 lost = derivative_loss(box, vec2(patch.param[0], patch.param[1]), newton.shape.degree_u, newton.shape.degree_v);
     uint search_work = uint(kNewtonSteps + 2) * newton.work;
     LeafPlane plane;
     uint stack[3 * kDeepestSplit + 1];

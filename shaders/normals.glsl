@@ -5,15 +5,12 @@ vec3 bezier_normal(PatchRecord patch, vec2 uv)
 {
     const float kFlat = 1e-10f; // square of the sine, or of the ratio of lengths, that rounding leaves no digits
     const float kInwards = 1.0f / 2048.0f;
-    uint degree_u = (patch.shape >> 8) & 0xffu;
-    uint degree_v = (patch.shape >> 16) & 0xffu;
-    bool rational = has_feature(kFeatureRational) && (patch.shape & kShapeRational) != 0u;
-    if (local_floats > 0u)
-        copy_control_points(patch, (degree_u + 1u) * (degree_v + 1u) * (rational ? 4u : 3u));
+    PatchShape shape = patch_shape(patch.shape);
+    copy_control_points(patch, shape);
     vec3 normal = vec3(0.0f);
     bool flat_there = true;
     for (int attempt = 0; attempt < 2 && flat_there; ++attempt) {
-        SurfacePoint s = bezier_point(patch.first_control_point, int(degree_u), int(degree_v), rational, uv);
+        SurfacePoint s = patch_point(patch.first_control_point, shape, uv);
         normal = cross(s.du, s.dv);
         float du2 = dot(s.du, s.du);
         float dv2 = dot(s.dv, s.dv);

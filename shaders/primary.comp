@@ -37,6 +37,7 @@
 #include "shaders/materials.glsl"
 #include "shaders/ray_types.glsl"
 #include "shaders/eye_rays.glsl"
+#include "shaders/patch_point.glsl"
 #include "shaders/leaf_hit.glsl"
 #include "shaders/walk.glsl"
 #include "shaders/last_hits.glsl"

@@ -2,22 +2,20 @@
 
 bool measures() { return is_curvature_map(drawn_map()) || drawn_map() == kMapDraft; }
 
-Derivatives bezier_derivatives_at(PatchRecord patch, bool rational, vec2 uv)
+Derivatives bezier_derivatives_at(PatchRecord patch, PatchShape shape, vec2 uv)
 {
-    int degree_u = int((patch.shape >> 8) & 0xffu);
-    int degree_v = int((patch.shape >> 16) & 0xffu);
-    return bezier_derivatives(patch.first_control_point, degree_u, degree_v, rational, uv);
+    return bezier_derivatives(patch.first_control_point, shape.degree_u, shape.degree_v, shape.rational, uv);
 }
 
 // Of a Bezier patch; near poles those a little way inside. Its control points lie where bezier_normal copied them.
 Derivatives map_derivatives(PatchRecord patch, vec2 uv)
 {
-    bool rational = has_feature(kFeatureRational) && (patch.shape & kShapeRational) != 0u;
+    PatchShape shape = patch_shape(patch.shape);
     Derivatives s;
     float thin = 0.0f;
     // one call in the code: drivers inline each
     for (int attempt = 0; attempt < 2; ++attempt) {
-        Derivatives there = bezier_derivatives_at(patch, rational, attempt == 0 ? uv : from_pole(uv));
+        Derivatives there = bezier_derivatives_at(patch, shape, attempt == 0 ? uv : from_pole(uv));
         if (attempt == 0 || is_pole(thin, there))
             s = there;
         thin = thinness(there);
