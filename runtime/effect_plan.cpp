@@ -54,10 +54,9 @@ uint32_t common_degree(const PackFacts& facts, uint32_t DegreeCount::*direction)
     return shared ? first : 0;
 }
 
-// " 3 in u", or nothing
-std::string of_direction(uint32_t degree, const char* direction)
+std::string known_degree(uint32_t common, uint32_t largest)
 {
-    return degree > 0 ? fmt::format(" {} in {}", degree, direction) : "";
+    return common > 0 ? std::to_string(common) : fmt::format("up to {}", largest);
 }
 
 // What the tracer meets are patches; a file's cylinder may have been converted to Bezier patches.
@@ -322,6 +321,7 @@ EffectPlan effect_plan(const PackFacts& facts, const RenderOptions& options, Dev
     if (vulkan && plan.specialised) {
         plan.degree_u = common_degree(facts, &DegreeCount::degree_u);
         plan.degree_v = common_degree(facts, &DegreeCount::degree_v);
+        plan.largest_degree = facts.largest_degree();
     }
     if (device == DeviceKind::SoftwareVulkan) {
         const uint32_t net_floats = plan.specialised ? facts.largest_net_floats : kMostLocalFloats;
@@ -342,11 +342,11 @@ EffectPlan effect_plan(const PackFacts& facts, const RenderOptions& options, Dev
         add_drawing(facts, options, items);
         add_look(plan.look, options.look, items);
     }
-    if (plan.degree_u > 0 || plan.degree_v > 0)
-        items.push_back({"known-degrees", fmt::format("all Bezier patches are of degree{}{}: loops over their control "
-                                                      "points are of known length",
-                                                      of_direction(plan.degree_u, "u"),
-                                                      of_direction(plan.degree_v, "v"))});
+    if (vulkan && plan.specialised && facts.bezier_patches() > 0)
+        items.push_back({"known-degrees", fmt::format("the driver can unroll the loops over control points: degree {} "
+                                                      "in u, {} in v",
+                                                      known_degree(plan.degree_u, plan.largest_degree),
+                                                      known_degree(plan.degree_v, plan.largest_degree))});
     if (plan.local_floats > 0)
         items.push_back({"local-nets", fmt::format("a software driver: control points are copied beside each ray, {} "
                                                    "floats for the largest patch",

@@ -61,7 +61,9 @@ struct EffectPlan {
     SurfaceMap map = SurfaceMap::None; // none also where it would not be seen
     uint32_t look = 0;                 // LookBit
     bool specialised = true;           // RenderOptions::specialise; else the sizes below are every scene's
-    uint32_t degree_u = 0, degree_v = 0; // of all Bezier patches; 0: they differ, or the tracer is not specialised to it
+    uint32_t degree_u = 0,
+             degree_v = 0; // of all Bezier patches; 0: they differ, or the tracer is not specialised to it
+    uint32_t largest_degree = kMaxDegree; // ... in either direction
     uint32_t stack_size = 0;
     uint32_t local_floats = 0;    // control points are copied into an array of so many floats; 0: they are not
     uint32_t iteration_limit = 0; // loop iterations a subgroup may run; 0: no limit

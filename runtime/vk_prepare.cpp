@@ -64,37 +64,33 @@ Status VulkanTracer::prepare_frame(const FrameSetup& setup, uint32_t rows_per_ba
     return Done{};
 }
 
-// Uploads the borders' cells when a picture first asks for them, and makes the buffers of a band's edge words. A
-// picture that does not ask has a word in place of each.
+// Uploads the borders' cells when a picture first asks for them, and makes the buffers of a band's edge words.
 Status VulkanTracer::prepare_edges(const RenderOptions& options, uint32_t rows_per_band)
 {
-    edges_wanted_ = has_effects(options) && edge_query(options).any();
-    if (!has_border_cells_ && (edges_wanted_ || buffers_[kBindBorders].size_bytes() == 0)) {
-        const BorderCells cells = edges_wanted_ ? make_border_cells(scene_->pack.image) : BorderCells{{0}, {}};
-        Result<VulkanBuffer> borders =
-            upload_storage(*device_, std::as_bytes(std::span(cells.words)), "the borders' cells");
-        if (!borders)
-            return borders.error();
-        buffers_[kBindBorders] = std::move(*borders);
-        has_border_cells_ = edges_wanted_;
+    const EdgeQuery query = edge_query(options);
+    edges_wanted_ = has_effects(options) && query.any();
+    if (has_effects(options))
+        edge_map_.resize(options.width, options.height, query.line_reach_px > 0, query.border_reach_px > 0);
+    if (!edges_wanted_)
+        return Done{};
+    if (buffers_[kBindBorders].size_bytes() == 0) {
+        const BorderCells cells = make_border_cells(scene_->pack.image);
+        if (const Status uploaded = upload(kBindBorders, std::as_bytes(std::span(cells.words)), "the borders' cells");
+            !uploaded)
+            return uploaded;
     }
-    constexpr size_t kPixelBytes = 2 * sizeof(uint32_t);
-    const size_t band_bytes = edges_wanted_ ? size_t{rows_per_band} * options.width * kPixelBytes : kPixelBytes;
+    const size_t band_bytes = size_t{rows_per_band} * options.width * 2 * sizeof(uint32_t);
     if (buffers_[kBindEdges].size_bytes() < band_bytes) {
         Result<VulkanBuffer> edges = VulkanBuffer::create(*device_, BufferUse::Storage, band_bytes, "the edges");
         if (!edges)
             return edges.error();
         buffers_[kBindEdges] = std::move(*edges);
     }
-    if (edges_wanted_ && edges_readback_.size_bytes() < band_bytes) {
+    if (edges_readback_.size_bytes() < band_bytes) {
         Result<VulkanBuffer> readback = VulkanBuffer::create(*device_, BufferUse::Readback, band_bytes, "the edges");
         if (!readback)
             return readback.error();
         edges_readback_ = std::move(*readback);
-    }
-    if (has_effects(options)) {
-        const EdgeQuery query = edge_query(options);
-        edge_map_.resize(options.width, options.height, query.line_reach_px > 0, query.border_reach_px > 0);
     }
     return Done{};
 }
@@ -208,25 +204,24 @@ Status VulkanTracer::prepare_hits(std::initializer_list<uint32_t> bindings, size
     return Done{};
 }
 
-// A picture of one frame, or certified, keeps one element.
+// For pictures of many frames, not certified.
 Status VulkanTracer::prepare_kept(const RenderOptions& options)
 {
-    const size_t pixels = keeps_hits(options) ? size_t{options.width} * options.height : 1;
-    return prepare_hits({kBindKept}, pixels, sizeof(KeptHit), "--frames");
+    if (!keeps_hits(options))
+        return Done{};
+    return prepare_hits({kBindKept}, size_t{options.width} * options.height, sizeof(KeptHit), "--frames");
 }
 
 // Makes what the last picture left what this one begins from. Returns whether there was one of this size. All frames of
 // a picture begin from the same.
 Result<bool> VulkanTracer::prepare_last_hits(const RenderOptions& options)
 {
-    const bool reuse = reuses_hits(options);
-    const size_t pixels = reuse ? size_t{options.width} * options.height : 1;
-    if (const Status ready =
-            prepare_hits({kBindLastHits, kBindNextHits}, pixels, sizeof(LastHit), "RenderOptions::reuse_last");
+    if (!reuses_hits(options))
+        return false;
+    if (const Status ready = prepare_hits({kBindLastHits, kBindNextHits}, size_t{options.width} * options.height,
+                                          sizeof(LastHit), "RenderOptions::reuse_last");
         !ready)
         return ready.error();
-    if (!reuse)
-        return false;
     const bool has_last = std::exchange(next_hits_size_, {}) == std::array{options.width, options.height};
     if (has_last) {
         std::swap(buffers_[kBindLastHits], buffers_[kBindNextHits]);

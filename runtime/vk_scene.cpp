@@ -100,6 +100,8 @@ Status upload_arrays(VulkanDevice& device, std::span<const Array> arrays,
                      std::array<VulkanBuffer, kFrameBindings>& buffers)
 {
     for (const Array& array : arrays) {
+        if (array.bytes.empty())
+            continue;
         Result<VulkanBuffer> buffer = upload_storage(device, array.bytes, array.name);
         if (!buffer)
             return buffer.error();
@@ -153,6 +155,7 @@ Specialisation specialisation(const EffectPlan& plan, bool count)
     constants[kSpecIterationLimit] = plan.iteration_limit;
     constants[kSpecDegreeU] = plan.degree_u;
     constants[kSpecDegreeV] = plan.degree_v;
+    constants[kSpecLargestDegree] = plan.largest_degree;
     constants[kSpecMap] = known ? static_cast<uint32_t>(plan.map) : uint32_t{kMapNone};
     return constants;
 }
@@ -181,7 +184,6 @@ Result<std::array<VulkanBuffer, kFrameBindings>> upload_scene(VulkanDevice& devi
         {kBindCells, bytes_of(image.cells), "the trim cells"},
         {kBindCellEntries, bytes_of(image.cell_entries), "the trim cells' entries"},
         {kBindTrimPoints, bytes_of(image.trim_points), "the trim points"},
-        {kBindSdfWords, bytes_of(image.sdf_words), "the distance textures"},
     };
     std::array<VulkanBuffer, kFrameBindings> buffers;
     if (const Status uploaded = upload_arrays(device, arrays, buffers); !uploaded)

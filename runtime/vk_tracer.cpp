@@ -66,8 +66,6 @@ Status VulkanTracer::upload()
     if (!buffers)
         return buffers.error();
     buffers_ = std::move(*buffers);
-    if (const Status bound = upload_kd(*device_, KdTrims{}, buffers_); !bound)
-        return bound.error();
     const size_t count_bytes = kFrameCounts * 2 * sizeof(uint32_t);
     Result<VulkanBuffer> counts = VulkanBuffer::create(*device_, BufferUse::Storage, count_bytes, "the work counts");
     if (!counts)
@@ -125,6 +123,8 @@ Status VulkanTracer::upload(uint32_t binding, std::span<const std::byte> bytes, 
 // Builds and uploads what a trim mode reads beside the pack, when it is first asked for.
 Status VulkanTracer::upload_trims(TrimMode trim)
 {
+    if ((trim == TrimMode::Sdf || trim == TrimMode::Hybrid) && buffers_[kBindSdfWords].size_bytes() == 0)
+        return upload(kBindSdfWords, std::as_bytes(std::span(scene_->pack.image.sdf_words)), "the distance textures");
     if (trim != TrimMode::Kd || kd_bytes_ > 0)
         return Done{};
     const Result<KdTrims> kd = derive_kd(scene_->pack.image);
@@ -353,13 +353,13 @@ Result<Frame> VulkanTracer::render(const RenderOptions& options, RenderStats& st
     if (!plan.specialised)
         decide_late(plan, view);
     choose_start(0);
-    if (const Status none = forget_kept(); !none)
+    if (const Status none = forget_kept(plan); !none)
         return none.error();
     use_ = *counting;
     if (count_apart) {
         if (const Result<double> ms = trace_frame(view, rows_per_band, nullptr); !ms)
             return ms.error();
-        if (const Status none = forget_kept(); !none)
+        if (const Status none = forget_kept(plan); !none)
             return none.error();
     }
     use_ = *timed;

@@ -75,7 +75,10 @@ private:
     Status prepare_kept(const RenderOptions& options);
     Result<bool> prepare_last_hits(const RenderOptions& options);
     Status fill(uint32_t binding, uint32_t word);
-    Status forget_kept() { return fill(kBindKept, std::bit_cast<uint32_t>(kNothingKept)); }
+    Status forget_kept(const EffectPlan& plan)
+    {
+        return plan.keeps_hits ? fill(kBindKept, std::bit_cast<uint32_t>(kNothingKept)) : Status(Done{});
+    }
     Result<std::array<uint64_t, kFrameCounts>> read_counts();
     Result<double> time_dispatch(const ComputePipeline& pipeline, const FrameView& view, uint32_t groups_x,
                                  uint32_t groups_y);
@@ -112,7 +115,6 @@ private:
     VulkanBuffer edges_readback_;  // of a band's edge words
     VulkanBuffer values_readback_; // of what a map measures in a band
     bool edges_wanted_ = false;
-    bool has_border_cells_ = false; // on the device, once a picture asked for borders
     EdgeMap edge_map_;
     std::array<uint32_t, 2> next_hits_size_{}; // of the picture whose hits kBindNextHits holds; 0 x 0: of none
     VulkanBuffer retries_upload_;              // of kMostRetries indices

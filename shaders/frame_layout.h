@@ -135,7 +135,8 @@ TRIMRAY_CONST uint kSpecIterationLimit = 5u; // loop iterations a subgroup may r
 TRIMRAY_CONST uint kSpecMap = 6u;            // kMap
 TRIMRAY_CONST uint kSpecDegreeU = 7u;        // of all Bezier patches; 0: they differ
 TRIMRAY_CONST uint kSpecDegreeV = 8u;
-TRIMRAY_CONST uint kFrameSpecs = 9u;
+TRIMRAY_CONST uint kSpecLargestDegree = 9u;  // ... in either direction
+TRIMRAY_CONST uint kFrameSpecs = 10u;
 
 TRIMRAY_CONST uint kTrimByCells = 0u;
 TRIMRAY_CONST uint kTrimByTexture = 1u;
@@ -169,7 +170,7 @@ TRIMRAY_CONST uint kBlendAll = 0xffffffffu;  // ... of blend.comp: all layers ar
 
 TRIMRAY_CONST uint kGroupSide = 8u; // workgroups are 8 x 8 pixels
 
-// Bindings of the shaders
+// Bindings of the shaders. What neither the pack nor the picture has is not there: nothing is bound in its place
 TRIMRAY_CONST uint kBindInstances = 0u;
 TRIMRAY_CONST uint kBindTopNodes = 1u;
 TRIMRAY_CONST uint kBindPartNodes = 2u;
@@ -186,16 +187,14 @@ TRIMRAY_CONST uint kBindCounts = 12u;
 TRIMRAY_CONST uint kBindRetries = 13u;
 TRIMRAY_CONST uint kBindBorders = 14u; // BorderCells (runtime/border_cells.h)
 TRIMRAY_CONST uint kBindEdges = 15u;   // two edge words a pixel: line, border
-// of one element where the trim mode is not kd
 TRIMRAY_CONST uint kBindKdNodes = 16u;
 TRIMRAY_CONST uint kBindKdRuns = 17u;
 TRIMRAY_CONST uint kBindKdPoints = 18u;
 TRIMRAY_CONST uint kBindKdFaces = 19u;
-TRIMRAY_CONST uint kBindKept = 20u; // a KeptHit a pixel of the picture; of one element without kFeatureKept
-// a LastHit a pixel of the picture; of one element without kFeatureReuse
+TRIMRAY_CONST uint kBindKept = 20u; // a KeptHit a pixel of the picture
+// a LastHit a pixel of the picture
 TRIMRAY_CONST uint kBindLastHits = 21u; // the last picture's
 TRIMRAY_CONST uint kBindNextHits = 22u; // this one's, for the next
-// of nothing where the scene's look does not ask for them
 TRIMRAY_CONST uint kBindLook = 23u;        // LookFrame and light samples (look_layout.h)
 TRIMRAY_CONST uint kBindToPart = 24u;      // a WorldToPart an instance
 TRIMRAY_CONST uint kBindLitPixels = 25u;   // a LitPixel a pixel of the band

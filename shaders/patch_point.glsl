@@ -1,5 +1,5 @@
-// Points of Bezier patches. A degree that all of the pack's patches have is known when the driver compiles: loops of
-// known length need no array that is indexed at run time, and no mask of lanes that go on.
+// Points of Bezier patches. A degree that all of the pack's patches have, and the largest, are known when the driver
+// compiles: loops that it unrolls need no array that is indexed at run time, and no mask of lanes that go on.
 
 // PatchRecord.shape's fields
 struct PatchShape {

@@ -60,6 +60,7 @@ layout(constant_id = kSpecIterationLimit) const uint iteration_limit = 0u;
 layout(constant_id = kSpecMap) const uint surface_map = kMapNone;
 layout(constant_id = kSpecDegreeU) const uint common_degree_u = 0u;
 layout(constant_id = kSpecDegreeV) const uint common_degree_v = 0u;
+layout(constant_id = kSpecLargestDegree) const uint largest_degree = kMaxDegree;
 
 // A patch's control points copied beside the invocation, where the driver reads buffers slowly
 const uint local_size = local_floats > 0u ? local_floats : 1u;

@@ -169,6 +169,33 @@ TEST(effect_plan, says_what_tracers_specialise_themselves_from)
     EXPECT_EQ(plan_of(image, options, DeviceKind::Vulkan).iteration_limit, 0u);
 }
 
+TEST(effect_plan, knows_the_degrees_that_all_bezier_patches_share_through_vulkan)
+{
+    PackImage image = bare_plane();
+    const auto add = [&](uint32_t degree_u, uint32_t degree_v, uint32_t flags) {
+        image.patches.push_back(image.patches[0]);
+        image.patches.back().shape = kKindBezier | degree_u << 8 | degree_v << 16 | flags;
+    };
+    const auto degrees = [&](DeviceKind device) {
+        const EffectPlan plan = plan_of(image, {}, device);
+        return std::array{plan.degree_u, plan.degree_v, plan.largest_degree};
+    };
+    EXPECT_EQ(degrees(DeviceKind::Vulkan), (std::array{0u, 0u, 0u})) << "no such patches";
+    add(1, 3, 0);
+    add(1, 3, kShapeRational);
+    EXPECT_EQ(degrees(DeviceKind::Vulkan), (std::array{1u, 3u, 3u}));
+    EXPECT_THAT(plan_of(image, {}, DeviceKind::Vulkan).items,
+                testing::Contains(
+                    testing::AllOf(testing::Field(&EffectItem::name, "known-degrees"),
+                                   testing::Field(&EffectItem::why, testing::HasSubstr("degree 1 in u, 3 in v")))));
+    add(4, 3, 0);
+    EXPECT_EQ(degrees(DeviceKind::SoftwareVulkan), (std::array{0u, 3u, 4u}));
+    EXPECT_EQ(degrees(DeviceKind::Cpu), (std::array{0u, 0u, kMaxDegree})) << "the CPU tracer has its own functions";
+    RenderOptions options;
+    options.specialise = false;
+    EXPECT_EQ(plan_of(image, options, DeviceKind::Vulkan).largest_degree, kMaxDegree);
+}
+
 TEST(effect_plan, has_every_scenes_sizes_where_tracers_are_not_to_specialise_themselves)
 {
     RenderOptions options;

@@ -27,6 +27,7 @@ FN void bernstein(int degree, real t, INOUT_ARRAY(basis, kBasisSize))
     PRECISE real s = 1.0f - t;
     basis[0] = real(1.0f);
     for (int k = 1; k <= degree; ++k) {
+        STOP_PAST_DEGREES(k);
         PRECISE real saved = real(0.0f);
         for (int i = 0; i < k; ++i) {
             PRECISE real old = basis[i];
@@ -69,12 +70,14 @@ FN SurfacePoint bezier_point(FETCH_PARAM uint first, int degree_u, int degree_v,
     a.w11 = real(0.0f);
     uint at = first;
     for (int i = 0; i <= degree_u; ++i) {
+        STOP_PAST_DEGREES(i);
         // the row's curve as two of degree_v - 1: from its first and from its second control point on
         real3 row0 = zero;
         real3 row1 = zero;
         real row0_w = real(0.0f);
         real row1_w = real(0.0f);
         for (int j = 0; j <= degree_v; ++j) {
+            STOP_PAST_DEGREES(j);
             scalar3 c = scalar3(fetch_control(FETCH_PASS at), fetch_control(FETCH_PASS at + 1u),
                                 fetch_control(FETCH_PASS at + 2u));
             if (j < degree_v)

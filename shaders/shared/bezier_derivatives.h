@@ -108,6 +108,7 @@ FN_LARGE Derivatives bezier_derivatives(FETCH_PARAM uint first, int degree_u, in
     NetSum avv = no_sum();
     uint at = first;
     for (int i = 0; i <= degree_u; ++i) {
+        STOP_PAST_DEGREES(i);
         NetSum row = no_sum();
         NetSum row_u = no_sum();
         NetSum row_v = no_sum();
@@ -115,6 +116,7 @@ FN_LARGE Derivatives bezier_derivatives(FETCH_PARAM uint first, int degree_u, in
         NetSum row_uv = no_sum();
         NetSum row_vv = no_sum();
         for (int j = 0; j <= degree_v; ++j) {
+            STOP_PAST_DEGREES(j);
             ControlPoint c = control_point(FETCH_PASS at, rational);
             ControlPoint to_v = c; // c_{j+1} - c_j
             row = plus_point(row, v0[j], c);

@@ -15,7 +15,9 @@
 // decides on: GLSL must not fuse or reorder it either. No trigonometry on a path that decides: see angle_of.
 //
 // FN opens a function; FN_LARGE one that C++ must not inline, for it is long and called often.
-// FETCH_PARAM and FETCH_PASS carry the source of fetch_* functions: an argument in C++, buffers in GLSL, nothing there.
+// STOP_PAST_DEGREES(i); ends a loop that `i` counts up to a degree, for drivers unroll loops whose longest is known
+// when they compile; C++ has functions of their own for common degrees (runtime/cpu_evaluate.h). FETCH_PARAM and
+// FETCH_PASS carry the source of fetch_* functions: an argument in C++, buffers in GLSL, nothing there.
 #if defined(TRIMRAY_SHARED_LANGUAGE_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef TRIMRAY_SHARED_LANGUAGE_H
 #undef TRIMRAY_SHARED_LANGUAGE_H
@@ -32,6 +34,9 @@
 #define FN
 #define FN_LARGE
 #define PRECISE precise
+#define STOP_PAST_DEGREES(i)                                                                                           \
+    if (i > int(largest_degree))                                                                                       \
+    break
 #define FETCH_PARAM
 #define FETCH_PASS
 #define INOUT_ARRAY(name, count) inout float name[count]

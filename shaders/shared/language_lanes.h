@@ -27,6 +27,7 @@
 #define FN_LARGE [[maybe_unused]] static HWY_NOINLINE HWY_ATTR
 #ifndef PRECISE
 #define PRECISE // the C++ side is compiled with -ffp-contract=off
+#define STOP_PAST_DEGREES(i)
 #define FETCH_PARAM const FetchSource &source,
 #define FETCH_PASS source,
 #define INOUT_ARRAY(name, count) real(&name)[count]
