@@ -135,7 +135,7 @@ TRIMRAY_CONST uint kSpecIterationLimit = 5u; // loop iterations a subgroup may r
 TRIMRAY_CONST uint kSpecMap = 6u;            // kMap
 TRIMRAY_CONST uint kSpecDegreeU = 7u;        // of all Bezier patches; 0: they differ
 TRIMRAY_CONST uint kSpecDegreeV = 8u;
-TRIMRAY_CONST uint kSpecLargestDegree = 9u;  // ... in either direction
+TRIMRAY_CONST uint kSpecLargestDegree = 9u; // ... in either direction
 TRIMRAY_CONST uint kFrameSpecs = 10u;
 
 TRIMRAY_CONST uint kTrimByCells = 0u;
@@ -193,8 +193,8 @@ TRIMRAY_CONST uint kBindKdPoints = 18u;
 TRIMRAY_CONST uint kBindKdFaces = 19u;
 TRIMRAY_CONST uint kBindKept = 20u; // a KeptHit a pixel of the picture
 // a LastHit a pixel of the picture
-TRIMRAY_CONST uint kBindLastHits = 21u; // the last picture's
-TRIMRAY_CONST uint kBindNextHits = 22u; // this one's, for the next
+TRIMRAY_CONST uint kBindLastHits = 21u;    // the last picture's
+TRIMRAY_CONST uint kBindNextHits = 22u;    // this one's, for the next
 TRIMRAY_CONST uint kBindLook = 23u;        // LookFrame and light samples (look_layout.h)
 TRIMRAY_CONST uint kBindToPart = 24u;      // a WorldToPart an instance
 TRIMRAY_CONST uint kBindLitPixels = 25u;   // a LitPixel a pixel of the band
