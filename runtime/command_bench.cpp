@@ -351,16 +351,23 @@ int run_bench_closest(ClosestArguments arguments)
     return kExitOk;
 }
 
-int run_bench_moving(MovingArguments arguments)
+/// The picture's size, and whether the device is a known one.
+template <class Options>
+Status set_picture(const std::string& size_text, Options& options)
 {
-    const Result<PictureSize> size = parse_size(arguments.size, 1);
+    const Result<PictureSize> size = parse_size(size_text, 1);
     if (!size.ok())
-        return report_error(size.error());
-    MovingBenchOptions& options = arguments.options;
-    if (const Status known = check_choice(device_choice(), options.device); !known.ok())
-        return report_error(known.error());
+        return size.error();
     options.width = size->width;
     options.height = size->height;
+    return check_choice(device_choice(), options.device);
+}
+
+int run_bench_moving(MovingArguments arguments)
+{
+    MovingBenchOptions& options = arguments.options;
+    if (const Status set = set_picture(arguments.size, options); !set.ok())
+        return report_error(set.error());
 
     Json packs = Json::array();
     std::string device;
@@ -380,8 +387,8 @@ int run_bench_moving(MovingArguments arguments)
         return code;
     if (arguments.json)
         print_json({{"device", device},
-                    {"width", size->width},
-                    {"height", size->height},
+                    {"width", options.width},
+                    {"height", options.height},
                     {"frames", options.pictures},
                     {"degrees", options.degrees},
                     {"packs", packs}});
@@ -390,14 +397,9 @@ int run_bench_moving(MovingArguments arguments)
 
 int run_bench_effects(EffectsArguments arguments)
 {
-    const Result<PictureSize> size = parse_size(arguments.size, 1);
-    if (!size.ok())
-        return report_error(size.error());
     EffectsBenchOptions& options = arguments.options;
-    if (const Status known = check_choice(device_choice(), options.device); !known.ok())
-        return report_error(known.error());
-    options.width = size->width;
-    options.height = size->height;
+    if (const Status set = set_picture(arguments.size, options); !set.ok())
+        return report_error(set.error());
 
     Json packs = Json::array();
     std::string device;
@@ -415,8 +417,8 @@ int run_bench_effects(EffectsArguments arguments)
         return code;
     if (arguments.json)
         print_json({{"device", device},
-                    {"width", size->width},
-                    {"height", size->height},
+                    {"width", options.width},
+                    {"height", options.height},
                     {"threads", options.threads},
                     {"rounds", options.rounds},
                     {"packs", packs}});

@@ -69,7 +69,7 @@ public:
             if (!has_asked_borders(face_id))
                 continue;
             find_in_leaf(packet, hit, leaves[lane], instances[lane], lanes, line, border);
-            if (job_.edges->drawer && has_light_lines(image_, face_id, instances[lane]))
+            if (job_.edges->drawer && has_light_lines(FaceColors{job_.scene, job_.materials}, face_id, instances[lane]))
                 light = light || same;
         }
         const EdgeQuery& query = job_.edges->query;

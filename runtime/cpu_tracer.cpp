@@ -151,6 +151,7 @@ private:
             map = MapJob{uint(look.map), map_view(cpu_scene_->image, look), measures(look.map)};
         job.map = map ? &*map : nullptr;
         const bool effects = has_effects(options);
+        const FaceColors colors{*cpu_scene_, job.materials};
         std::optional<BlockLineDrawer> drawer;
         std::optional<EdgeJob> edges;
         if (effects) {
@@ -158,7 +159,7 @@ private:
             edge_map_.resize(options.width, options.height, query.line_reach_px > 0, query.border_reach_px > 0);
             edge_map_.own_halves_drawn = own_halves_alone(options);
             if (edge_map_.own_halves_drawn)
-                drawer.emplace(scene_->pack.image, options, edge_map_);
+                drawer.emplace(colors, options, edge_map_);
             if (query.any())
                 edges.emplace(EdgeJob{query, *border_cells_, edge_map_, options, drawer ? &*drawer : nullptr});
         }
@@ -181,7 +182,7 @@ private:
         };
         run_each(columns * rows, trace_one);
         if (effects)
-            draw_effects(scene_->pack.image, options, run_each, edge_map_, frame);
+            draw_effects(colors, options, run_each, edge_map_, frame);
         WorkCounts sum;
         for (const WorkCounts& some : counts)
             sum += some;

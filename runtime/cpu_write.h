@@ -10,6 +10,7 @@
 #include "format/pack_layout.h"
 #include "runtime/cpu_lanes.h"
 #include "runtime/cpu_maps.h"
+#include "runtime/face_colors.h"
 #include "shaders/shared/environment.h"
 #include "shaders/shared/language.h"
 #include "shaders/shared/leaf_box.h"
@@ -68,12 +69,7 @@ private:
 template <bool kLook>
 const float* color_of(const BlockJob& job, uint face, uint instance)
 {
-    if constexpr (kLook)
-        if (job.materials)
-            if (const MaterialRecord& material = job.materials->of(face, instance); material.has_color > 0)
-                return material.color;
-    const bool own = (job.scene.image.faces[face].flags & kFaceHasColor) != 0;
-    return own ? job.scene.face_color[face].data() : job.scene.instance_color[instance].data();
+    return FaceColors{job.scene, kLook ? job.materials : nullptr}.of(face, instance);
 }
 
 /// What the hits look like in the world, lane by lane.

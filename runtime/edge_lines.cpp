@@ -1,25 +1,8 @@
 #include "runtime/edge_lines.h"
 
-#include "runtime/image_io.h"
-
 #include <utility>
 
 namespace trimray {
-namespace {
-
-/// The share of a colour channel, sRGB byte to linear light.
-const std::array<float, 256>& linear_of_byte()
-{
-    static const std::array<float, 256> table = [] {
-        std::array<float, 256> t{};
-        for (size_t i = 0; i < t.size(); ++i)
-            t[i] = srgb_to_linear(static_cast<float>(i) / 255);
-        return t;
-    }();
-    return table;
-}
-
-} // namespace
 
 void EdgeMap::resize(uint32_t width, uint32_t height, bool lines, bool borders)
 {
@@ -42,33 +25,26 @@ int farthest_step(float width)
     return static_cast<int>((line_reach(width) + line_query_reach(width) + kRounding) / kLeastLean);
 }
 
-bool has_light_lines(const PackImage& image, uint32_t face, uint32_t instance)
+bool has_light_lines(const FaceColors& colors, uint32_t face, uint32_t instance)
 {
-    const FaceRecord& record = image.faces[face];
-    uint32_t rgba = image.instances[instance].color_rgba;
-    if ((record.flags & kFaceHasColor) != 0)
-        rgba = record.color_rgba;
-    else if (rgba >> 24 == 0)
-        return false; // the default grey is light
-    const std::array<float, 256>& linear = linear_of_byte();
-    const float luminance =
-        0.2126f * linear[rgba & 0xffu] + 0.7152f * linear[rgba >> 8 & 0xffu] + 0.0722f * linear[rgba >> 16 & 0xffu];
+    const float* color = colors.of(face, instance);
+    const float luminance = 0.2126f * color[0] + 0.7152f * color[1] + 0.0722f * color[2];
     constexpr float kDarkFace = 0.045f; // sRGB 59 of 255
     return luminance < kDarkFace;
 }
 
-std::array<float, 3> line_color_at(const PackImage& image, const RenderOptions& options, const SeenPixels& pixels,
+std::array<float, 3> line_color_at(const FaceColors& colors, const RenderOptions& options, const SeenPixels& pixels,
                                    size_t i)
 {
     if (options.edge_color)
         return *options.edge_color;
     if (!options.fill || !pixels.is_hit(i))
         return kDarkLine;
-    const bool light = has_light_lines(image, uint32_t(pixels.face[i]), uint32_t(pixels.instance[i]));
+    const bool light = has_light_lines(colors, uint32_t(pixels.face[i]), uint32_t(pixels.instance[i]));
     return light ? kLightLine : kDarkLine;
 }
 
-std::array<float, 4> color_below(const PackImage& image, const RenderOptions& options, const EdgeMap& map,
+std::array<float, 4> color_below(const FaceColors& colors, const RenderOptions& options, const EdgeMap& map,
                                  const SeenPixels& pixels, int x, int y)
 {
     const size_t i = pixels.at(x, y);
@@ -77,15 +53,15 @@ std::array<float, 4> color_below(const PackImage& image, const RenderOptions& op
         std::copy_n(&pixels.rgba[4 * i], 4, rgba.begin());
     const float share = drawn_share(map, options.edge_width_px, x, y);
     if (share > 0 && share < 1) {
-        const std::array<float, 3> line = line_color_at(image, options, pixels, i);
+        const std::array<float, 3> line = line_color_at(colors, options, pixels, i);
         for (size_t c = 0; c < 3; ++c)
             rgba[c] = (rgba[c] - share * line[c]) / (1 - share);
     }
     return rgba;
 }
 
-BlockLineDrawer::BlockLineDrawer(const PackImage& image, const RenderOptions& options, EdgeMap& map)
-    : image_(image), options_(options), map_(map), rays_(options.camera, options.width, options.height),
+BlockLineDrawer::BlockLineDrawer(const FaceColors& colors, const RenderOptions& options, EdgeMap& map)
+    : colors_(colors), options_(options), map_(map), rays_(options.camera, options.width, options.height),
       farthest_(farthest_step(options.edge_width_px))
 {
 }
@@ -123,9 +99,9 @@ void BlockLineDrawer::draw(const SeenPixels& pixels, BlockMarks& scratch) const
             waiting.marks.push_back({uint32_t(map_.word_of(uint32_t(x), uint32_t(y))), mark});
             continue;
         }
-        std::array<float, 4> rgba = color_below(image_, options_, map_, pixels, x, y);
+        std::array<float, 4> rgba = color_below(colors_, options_, map_, pixels, x, y);
         const auto [fx, fy] = map_.pixel_of(mark.from);
-        const std::array<float, 3> line = line_color_at(image_, options_, pixels, pixels.at(fx, fy));
+        const std::array<float, 3> line = line_color_at(colors_, options_, pixels, pixels.at(fx, fy));
         mix(rgba, {line[0], line[1], line[2], 1}, mark.share);
         std::copy(rgba.begin(), rgba.end(), &pixels.rgba[4 * pixels.at(x, y)]);
     }

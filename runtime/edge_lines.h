@@ -3,8 +3,8 @@
 // is the strongest mark. A tracer may draw both a block at a time, while the block's pixels are in the caches.
 #pragma once
 
-#include "format/pack_image.h"
 #include "runtime/edge_map.h"
+#include "runtime/face_colors.h"
 #include "runtime/seen_pixels.h"
 #include "runtime/tracer.h"
 
@@ -63,10 +63,10 @@ inline float own_line_share(uint32_t word, float width_px)
 
 /// Lines on light and on dark faces, where no colour is asked for. Linear light.
 constexpr std::array<float, 3> kDarkLine = {0.012f, 0.012f, 0.015f}, kLightLine = {0.22f, 0.22f, 0.23f};
-bool has_light_lines(const PackImage& image, uint32_t face, uint32_t instance);
+bool has_light_lines(const FaceColors& colors, uint32_t face, uint32_t instance);
 
 /// The colour of the lines of what pixel i of `pixels` shows: the one asked for, or one that shows there.
-std::array<float, 3> line_color_at(const PackImage& image, const RenderOptions& options, const SeenPixels& pixels,
+std::array<float, 3> line_color_at(const FaceColors& colors, const RenderOptions& options, const SeenPixels& pixels,
                                    size_t i);
 
 /// The share of (x, y) that its own line has in the pixels as they were traced.
@@ -166,7 +166,7 @@ bool walk_outer_half(const SeenPixels& pixels, const EdgeMap& map, float width, 
 }
 
 /// The colour that (x, y) would have without its own line; its own colour where the line covers all of it.
-std::array<float, 4> color_below(const PackImage& image, const RenderOptions& options, const EdgeMap& map,
+std::array<float, 4> color_below(const FaceColors& colors, const RenderOptions& options, const EdgeMap& map,
                                  const SeenPixels& pixels, int x, int y);
 
 /// The marks of a block on its own pixels, reused from block to block.
@@ -180,7 +180,7 @@ struct BlockMarks {
 class BlockLineDrawer {
 public:
     /// All must outlive it. Domain: map.own_halves_drawn.
-    BlockLineDrawer(const PackImage& image, const RenderOptions& options, EdgeMap& map);
+    BlockLineDrawer(const FaceColors& colors, const RenderOptions& options, EdgeMap& map);
 
     const PictureRays& rays() const { return rays_; }
 
@@ -192,7 +192,7 @@ public:
 private:
     bool is_out_of_reach(const SeenPixels& pixels, int x, int y) const;
 
-    const PackImage& image_;
+    const FaceColors colors_;
     const RenderOptions& options_;
     EdgeMap& map_;
     const PictureRays rays_;

@@ -56,8 +56,8 @@ struct BandMarks {
 
 class Effects {
 public:
-    Effects(const PackImage& image, const RenderOptions& options, EdgeMap& map, Frame& frame)
-        : image_(image), options_(options), query_(edge_query(options)), map_(map), frame_(frame),
+    Effects(const FaceColors& colors, const RenderOptions& options, EdgeMap& map, Frame& frame)
+        : colors_(colors), options_(options), query_(edge_query(options)), map_(map), frame_(frame),
           width_(int(frame.width)), height_(int(frame.height)),
           rays_(options.camera, frame.width, frame.height), seen_{rays_,
                                                                   0,
@@ -102,7 +102,7 @@ private:
     void draw_waiting(BandMarks& band, int y0, int y1) const;
     std::array<float, 4> color(size_t i) const;
 
-    const PackImage& image_;
+    const FaceColors colors_;
     const RenderOptions& options_;
     const EdgeQuery query_;
     EdgeMap& map_;
@@ -429,12 +429,12 @@ std::vector<Painted> Effects::paint(uint32_t band_index) const
                 continue;
             const uint32_t packet = band.packets[place];
             const int x = int(4 * (packet % map_.columns) + i % 4), y = y0 + int(4 * (packet / map_.columns) + i / 4);
-            std::array<float, 4> rgba = color_below(image_, options_, map_, seen_, x, y);
+            std::array<float, 4> rgba = color_below(colors_, options_, map_, seen_, x, y);
             if (m.cover_from != kNone)
                 mix(rgba, color(m.cover_from), m.cover);
             if (m.line.from != kNoWord) {
                 const auto [fx, fy] = map_.pixel_of(m.line.from);
-                const std::array<float, 3> drawn = line_color_at(image_, options_, seen_, at(fx, fy));
+                const std::array<float, 3> drawn = line_color_at(colors_, options_, seen_, at(fx, fy));
                 mix(rgba, {drawn[0], drawn[1], drawn[2], 1}, m.line.share);
             }
             painted.push_back({static_cast<uint32_t>(at(x, y)), rgba});
@@ -492,10 +492,10 @@ Status check_effects(const RenderOptions& options)
     return Done{};
 }
 
-void draw_effects(const PackImage& image, const RenderOptions& options, const RunEach& run_each, EdgeMap& map,
+void draw_effects(const FaceColors& colors, const RenderOptions& options, const RunEach& run_each, EdgeMap& map,
                   Frame& frame)
 {
-    Effects effects(image, options, map, frame);
+    Effects effects(colors, options, map, frame);
     const uint32_t bands = effects.band_count();
     if (edge_query(options).border_reach_px > 0)
         run_each(bands, [&](uint32_t band) { effects.find_rims(band); });

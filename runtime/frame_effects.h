@@ -9,8 +9,8 @@
 // from their neighbour, so that lines are as wide everywhere.
 #pragma once
 
-#include "format/pack_image.h"
 #include "runtime/edge_map.h"
+#include "runtime/face_colors.h"
 #include "runtime/tracer.h"
 
 #include <cstdint>
@@ -46,7 +46,7 @@ bool has_effects(const RenderOptions& options);
 
 /// Draws the effects of `options` into frame.rgba. `map` is what the tracer noted for edge_query(options).
 /// The result does not depend on how `run_each` orders its calls.
-void draw_effects(const PackImage& image, const RenderOptions& options, const RunEach& run_each, EdgeMap& map,
+void draw_effects(const FaceColors& colors, const RenderOptions& options, const RunEach& run_each, EdgeMap& map,
                   Frame& frame);
 
 } // namespace trimray

@@ -2,7 +2,6 @@
 // for what it has not.
 #include "runtime/border_cells.h"
 #include "runtime/frame_effects.h"
-#include "runtime/materials.h"
 #include "runtime/section_view.h"
 #include "runtime/surface_map.h"
 #include "runtime/vk_tracer.h"
@@ -165,11 +164,13 @@ Status VulkanTracer::prepare_look(const RenderOptions& options, const EffectPlan
 // Uploads what faces are made of and what is around the model, where the scene says so.
 Status VulkanTracer::prepare_materials(const RenderOptions& options, const EffectPlan& plan)
 {
+    materials_.reset();
     if (plan.materials) {
-        const Result<MaterialTable> table = resolve_materials(scene_->pack.image, options.look);
+        Result<MaterialTable> table = resolve_materials(scene_->pack.image, options.look);
         if (!table)
             return table.error();
-        const std::vector<uint32_t> words = material_words(*table);
+        materials_ = std::move(*table);
+        const std::vector<uint32_t> words = material_words(*materials_);
         if (const Status uploaded = upload(kBindMaterials, std::as_bytes(std::span(words)), "the materials"); !uploaded)
             return uploaded;
     }

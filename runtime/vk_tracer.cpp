@@ -255,7 +255,7 @@ double VulkanTracer::draw(const RenderOptions& options, Frame& frame)
     const RunEach run_each = [&arena](uint32_t count, const std::function<void(uint32_t)>& body) {
         arena.execute([&] { tbb::parallel_for(0u, count, body); });
     };
-    draw_effects(scene_->pack.image, options, run_each, edge_map_, frame);
+    draw_effects({*cpu_scene_, materials_ ? &*materials_ : nullptr}, options, run_each, edge_map_, frame);
     return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
 }
 

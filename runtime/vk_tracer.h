@@ -5,6 +5,7 @@
 #include "runtime/edge_map.h"
 #include "runtime/effect_plan.h"
 #include "runtime/light_view.h"
+#include "runtime/materials.h"
 #include "runtime/stochastic_frames.h"
 #include "runtime/tracer.h"
 #include "runtime/vk_buffer.h"
@@ -19,6 +20,7 @@
 #include <deque>
 #include <initializer_list>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
@@ -119,7 +121,8 @@ private:
     std::array<uint32_t, 2> next_hits_size_{}; // of the picture whose hits kBindNextHits holds; 0 x 0: of none
     VulkanBuffer retries_upload_;              // of kMostRetries indices
     VulkanBuffer counts_readback_;
-    FrameLights lights_; // of the picture at hand
+    FrameLights lights_; // of the picture at hand, and what its faces are made of; none: what the pack says
+    std::optional<MaterialTable> materials_;
     // The pipelines that the picture at hand needs; null: it does not
     struct Pipelines {
         ComputePipeline* primary = nullptr;

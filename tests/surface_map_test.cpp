@@ -1,8 +1,8 @@
 // Maps drawn on surfaces against closed forms, on the CPU and through Vulkan; what both draw, and pictures kept of it.
 #include "runtime/surface_map.h"
+#include "tests/closed_forms.h"
 #include "tests/compare_frames.h"
 #include "tests/golden_pictures.h"
-#include "tests/keep_vulkan_loaded.h"
 #include "tests/traced_scenes.h"
 
 #include <fmt/format.h>
@@ -20,9 +20,6 @@
 
 namespace trimray {
 namespace {
-
-using Vec3 = std::array<double, 3>;
-constexpr double kPi = std::numbers::pi;
 
 double dot(const Vec3& a, const Vec3& b)
 {
@@ -48,21 +45,13 @@ RenderOptions seen_from(const Vec3& eye, SurfaceMap map)
     return options;
 }
 
-/// The unit direction through (x, y) of the picture, in pixels.
-Vec3 towards(const CameraRays& rays, double x, double y)
-{
-    return unit(scaled_sum(scaled_sum(rays.corner, x, rays.step_x), y, rays.step_y));
-}
-
 /// Calls with each pixel that shows a face, and where its hit is.
 void each_hit(const Frame& frame, const RenderOptions& options, const std::function<void(size_t, const Vec3&)>& body)
 {
-    const CameraRays rays = camera_rays(options.camera, options.width, options.height);
+    const PixelRays rays(options);
     for (size_t i = 0; i < frame.face.size(); ++i)
-        if (frame.face[i] >= 0) {
-            const Vec3 along = towards(rays, double(i % frame.width) + 0.5, double(i / frame.width) + 0.5);
-            body(i, scaled_sum(rays.eye, double(frame.depth_mm[i]), along));
-        }
+        if (frame.face[i] >= 0)
+            body(i, rays.hit(frame, i));
 }
 
 struct Principal {
@@ -279,7 +268,7 @@ void expect_bands(const std::shared_ptr<const Scene>& scene, const RenderOptions
     EXPECT_TRUE(frame.map_value.empty());
     const bool zebra = options.look.map.map == SurfaceMap::Zebra;
     const Vec3 axis = unit(options.look.map.direction);
-    const CameraRays rays = camera_rays(options.camera, options.width, options.height);
+    const PixelRays rays(options);
     const double dark = zebra ? 0.01 : 0.0;
     double sum = 0, worst = 0;
     int hits = 0, mixed = 0;
@@ -287,15 +276,16 @@ void expect_bands(const std::shared_ptr<const Scene>& scene, const RenderOptions
         const double x = double(i % frame.width), y = double(i / frame.width);
         int light = 0;
         for (int s = 0; s < kSamples * kSamples; ++s) {
-            const Vec3 along = towards(rays, x + (s % kSamples + 0.5) / kSamples, y + (s / kSamples + 0.5) / kSamples);
-            const auto n = normal_at(rays.eye, along);
+            const reference::Ray ray =
+                rays.through(x + (s % kSamples + 0.5) / kSamples, y + (s / kSamples + 0.5) / kSamples);
+            const auto n = normal_at(ray.origin, ray.direction);
             if (!n)
                 return;
-            const Vec3 seen = zebra ? scaled_sum(along, -2 * dot(*n, along), *n) : *n;
+            const Vec3 seen = zebra ? scaled_sum(ray.direction, -2 * dot(*n, ray.direction), *n) : *n;
             light += is_light(angle_between(seen, axis), options.look.map.stripes);
         }
-        const Vec3 middle = towards(rays, x + 0.5, y + 0.5);
-        const double facing = std::abs(dot(*normal_at(rays.eye, middle), middle));
+        const reference::Ray middle = rays.of_pixel(i);
+        const double facing = std::abs(dot(*normal_at(middle.origin, middle.direction), middle.direction));
         const double red = double(frame.rgba[4 * i]) / (0.4 + 0.6 * facing);
         const double share = (red - dark) / (0.95 - dark), expected = double(light) / (kSamples * kSamples);
         ++hits;
@@ -322,6 +312,8 @@ TEST(surface_map, zebra_stripes_are_the_mirror_images_of_rings_of_light)
 {
     TracedScene ball = one_sphere(7);
     RenderOptions options = seen_from({20, -30, 15}, SurfaceMap::Zebra);
+    expect_bands(ball.finish(), options, ball_normal);
+    options.camera.orthographic_mm = 18;
     expect_bands(ball.finish(), options, ball_normal);
 
     TracedScene sheet;
@@ -502,6 +494,7 @@ TEST_P(surface_maps_of_both, tracers_agree)
 {
     const auto scene = curved_kinds();
     RenderOptions options = overview(160, 90);
+    options.camera.orthographic_mm = GetParam() == SurfaceMap::Zebra ? 24 : 0;
     options.error_px = 1e-4f;
     options.look.map.map = GetParam();
     const Result<Frame> vulkan = draw_by_vulkan(scene, options);
