@@ -35,8 +35,9 @@ RenderOptions framed(const Scene& scene, double fov_deg)
 }
 
 /// Section planes pass through the model's middle. `change`: what else is asked for.
-void expect_drawn(const char* model, double fov_deg, const SceneLook& look, const std::string& name,
-                  const std::function<void(RenderOptions&)>& change = [](RenderOptions&) {})
+void expect_drawn(
+    const char* model, double fov_deg, const SceneLook& look, const std::string& name,
+    const std::function<void(RenderOptions&)>& change = [](RenderOptions&) {})
 {
     const auto scene = scene_of_file(std::string(TRIMRAY_TESTS_DIR) + "/models/" + model);
     ASSERT_TRUE(scene);
