@@ -130,7 +130,7 @@ constexpr DrawOption kOptions[] = {
      "x,y,z:nx,ny,nz, repeatable: cuts away what lies on the normal's side of a plane"},
     {"--caps", "effects.section.caps", put_words, kSections, "Cut solids: none, filled or hatched [filled]"},
     {"--cap-color", "effects.section.cap_color", put_words, kSections,
-     "auto (each part's own), black, white or #rrggbb [auto]"},
+     "auto (of the face behind), black, white or #rrggbb [auto]"},
     {"--map", "effects.map.kind", put_words, kSections,
      "In place of colours: zebra, isophotes, curvature-gaussian, curvature-mean, curvature-max, curvature-min or "
      "draft"},

@@ -74,7 +74,7 @@ struct SectionPlane {
 struct SectionLook {
     std::vector<SectionPlane> planes;
     CapStyle caps = CapStyle::Filled;
-    std::optional<std::array<float, 3>> cap_color; // none: each part's own
+    std::optional<std::array<float, 3>> cap_color; // none: that of the face behind
 };
 
 /// Light from all around and above, hidden by what is near.
