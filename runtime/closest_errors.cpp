@@ -31,17 +31,25 @@ Result<ReferencePicture> ReferencePicture::make(std::shared_ptr<const Scene> sce
     traced.threads = 0;
     traced.frames = 1;
     RenderStats stats;
-    const Result<Frame> frame = make_reference_tracer(scene)->render(traced, stats);
+    Result<Frame> frame = make_reference_tracer(scene)->render(traced, stats);
     if (!frame.ok())
         return frame.error();
-    return ReferencePicture(std::move(scene), options, *frame);
+    return ReferencePicture(std::move(scene), options, std::move(*frame));
 }
 
-ReferencePicture::ReferencePicture(std::shared_ptr<const Scene> scene, const RenderOptions& options, const Frame& frame)
+ReferencePicture::ReferencePicture(std::shared_ptr<const Scene> scene, const RenderOptions& options, Frame frame)
     : scene_(std::move(scene)), closest_(scene_->pack.image),
       rays_(camera_rays(options.camera, options.width, options.height)), width_(options.width), height_(options.height),
-      picture_(over_white(frame)), depth_mm_(frame.depth_mm), asked_(frame.depth_mm.size(), Asked::No)
+      frame_(std::move(frame)), picture_(over_white(frame_)), asked_(frame_.depth_mm.size(), Asked::No)
 {
+}
+
+double ReferencePicture::footprint_mm(size_t i) const
+{
+    const auto x = uint32_t(i % width_), y = uint32_t(i / width_);
+    const double angle =
+        std::max(length(rays_.step_x), length(rays_.step_y)) / length(pixel_ray(rays_, x, y).direction);
+    return double(frame_.depth_mm[i]) * angle;
 }
 
 bool ReferencePicture::is_tangent(uint32_t x, uint32_t y)
@@ -62,11 +70,9 @@ ClosestErrors ReferencePicture::errors(const Frame& frame)
         ClosestErrors& row = rows[y];
         for (uint32_t x = 0; x < width_; ++x) {
             const size_t i = size_t{y} * width_ + x;
-            const double right = double(depth_mm_[i]), traced = double(frame.depth_mm[i]);
+            const double right = double(frame_.depth_mm[i]), traced = double(frame.depth_mm[i]);
             const bool hits = std::isfinite(right), traced_hits = std::isfinite(traced);
-            const double per_mm = length(pixel_ray(rays_, x, y).direction) /
-                                  std::max(length(rays_.step_x), length(rays_.step_y)); // 1 / a pixel's angle
-            const bool apart = hits && traced_hits && std::abs(traced - right) * per_mm > kWrongDepth * right;
+            const bool apart = hits && traced_hits && std::abs(traced - right) > kWrongDepth * footprint_mm(i);
             if (hits == traced_hits && !apart)
                 continue;
             if (is_tangent(x, y))

@@ -34,8 +34,12 @@ public:
     /// Compares a frame of the same view and size, on all cores.
     ClosestErrors errors(const Frame& frame);
 
+    const Frame& frame() const { return frame_; }
+    /// A pixel's width where pixel i hits, world mm: its distance times its angle. Domain: it hits.
+    double footprint_mm(size_t i) const;
+
 private:
-    ReferencePicture(std::shared_ptr<const Scene> scene, const RenderOptions& options, const Frame& frame);
+    ReferencePicture(std::shared_ptr<const Scene> scene, const RenderOptions& options, Frame frame);
 
     bool is_tangent(uint32_t x, uint32_t y);
 
@@ -44,8 +48,8 @@ private:
     ClosestReference closest_;
     CameraRays rays_;
     uint32_t width_, height_;
+    Frame frame_;
     Picture picture_; // over white
-    std::vector<float> depth_mm_;
     std::vector<Asked> asked_;
 };
 
