@@ -1,7 +1,7 @@
 #include "runtime/bench_closest.h"
 
 #include "runtime/command_trace.h"
-#include "runtime/leaf_budget.h"
+#include "runtime/derived_scene.h"
 #include "runtime/median.h"
 
 #include <fmt/format.h>

@@ -1,9 +1,10 @@
 #include "runtime/bench_trims.h"
 
-#include "runtime/close_up.h"
+#include "runtime/bench_view.h"
 #include "runtime/command_json.h"
 #include "runtime/command_trace.h"
 #include "runtime/cpu_lanes.h"
+#include "runtime/derived_scene.h"
 #include "runtime/median.h"
 #include "runtime/thread_clock.h"
 #include "runtime/trim_mode.h"
@@ -24,16 +25,6 @@ struct Contestant {
     std::shared_ptr<const Scene> scene;
     std::unique_ptr<Tracer> tracer;
 };
-
-std::shared_ptr<const Scene> with_textures(const Scene& scene, const TrimTextureOptions& textures, double bytes)
-{
-    auto copy = std::make_shared<Scene>();
-    copy->pack.image = scene.pack.image;
-    allocate_trim_memory(copy->pack.image, bytes, textures);
-    derive_sdf(copy->pack.image);
-    copy->prepared = std::make_shared<CpuScene>(copy->pack.image);
-    return copy;
-}
 
 Result<std::vector<Contestant>> make_contestants(const std::shared_ptr<const Scene>& scene,
                                                  const TrimBenchOptions& options)
@@ -111,29 +102,6 @@ private:
     AnswerTrims answer_;
     uint64_t asked_ = 0;
 };
-
-Result<Camera> camera_of_view(const std::string& name, const std::shared_ptr<const Scene>& scene,
-                              const TrimBenchOptions& options)
-{
-    const PackImage& image = scene->pack.image;
-    SceneCamera asked;
-    const bool close = name == "close-up";
-    asked.view = close ? "iso" : name;
-    const Result<Camera> whole = camera_of(asked, image, options.width, options.height);
-    if (!whole.ok())
-        return Error{ErrorCode::Usage, "--views", whole.error().detail + "; or close-up"};
-    if (!close)
-        return whole;
-    const Result<std::unique_ptr<Tracer>> tracer = make_cpu_tracer(scene, options.instruction_set);
-    if (!tracer.ok())
-        return tracer.error();
-    RenderOptions render;
-    render.width = options.width;
-    render.height = options.height;
-    render.camera = *whole;
-    render.shade = false;
-    return close_up(**tracer, image, render, options.magnification);
-}
 
 /// What the rounds time of one setting.
 struct Times {
@@ -243,7 +211,7 @@ Result<TrimReport> bench_trims(const std::shared_ptr<const Scene>& scene, const 
     const TrimReference reference(scene->pack.image);
     TrimReport report{contestants->front().tracer->device_name(), {}};
     for (const std::string& name : options.views) {
-        const Result<Camera> camera = camera_of_view(name, scene, options);
+        const Result<Camera> camera = bench_view(name, scene, options.width, options.height, options.magnification);
         if (!camera.ok())
             return camera.error();
         Result<TrimView> view = measure_view(name, *camera, reference, *contestants, options, progress);

@@ -16,14 +16,30 @@ const std::vector<ExternalCommand>& external_commands()
 {
     static const std::vector<ExternalCommand> commands = {
         {"pack", "trimray-pack", "Convert a STEP, IGES or BREP model into a scene pack"},
+        {"bench accuracy", "trimray-accuracy", "What each digit costs in time and memory, as a report"},
     };
     return commands;
 }
 
-void register_external(CLI::App& app, const ExternalCommand& command)
+size_t words_of(const ExternalCommand& command, const std::vector<std::string>& arguments)
 {
-    // only for the list in `trimray --help`: main runs these before anything is parsed
-    app.add_subcommand(command.name, command.summary);
+    const std::string name = command.name;
+    const size_t space = name.find(' ');
+    if (space == std::string::npos)
+        return !arguments.empty() && arguments[0] == name ? 1 : 0;
+    return arguments.size() > 1 && arguments[0] == name.substr(0, space) && arguments[1] == name.substr(space + 1) ? 2
+                                                                                                                   : 0;
+}
+
+void register_externals(CLI::App& app, const std::string& parent)
+{
+    // only for the list in `--help`: main runs these before anything is parsed
+    for (const ExternalCommand& command : external_commands()) {
+        const std::string name = command.name;
+        const size_t space = name.find(' ');
+        if (parent == (space == std::string::npos ? "" : name.substr(0, space)))
+            app.add_subcommand(name.substr(space == std::string::npos ? 0 : space + 1), command.summary);
+    }
 }
 
 int run_external(const ExternalCommand& command, const std::vector<std::string>& arguments)
@@ -52,9 +68,7 @@ int run_external(const ExternalCommand& command, const std::vector<std::string>&
     const std::string beside = failed || own.empty() ? "trimray" : own.parent_path().string();
     return report_error(
         {ErrorCode::UnsupportedFormat, command.program,
-         fmt::format("not found beside {} nor in PATH; build it with -DTRIMRAY_PREPROCESS=ON (it needs OpenCASCADE) "
-                     "and install it there",
-                     beside)});
+         fmt::format("not found beside {} nor in PATH; build all of trimray and install it there", beside)});
 }
 
 } // namespace trimray

@@ -22,12 +22,15 @@ void register_version(CLI::App& app, int& exit_code);
 
 /// Programs of their own that run as subcommands, as git's do: `trimray pack` runs `trimray-pack` with all arguments.
 struct ExternalCommand {
-    const char* name;
+    const char* name; // one word, or two: a subcommand's subcommand
     const char* program;
     const char* summary;
 };
 const std::vector<ExternalCommand>& external_commands();
-void register_external(CLI::App& app, const ExternalCommand& command);
+/// How many of the first arguments are the command's name; 0: it is not asked for.
+size_t words_of(const ExternalCommand& command, const std::vector<std::string>& arguments);
+/// Lists those of one word, or those whose first word is `parent`, in the help of `app`.
+void register_externals(CLI::App& app, const std::string& parent = "");
 
 /// Replaces this process by the command's program: beside our own binary, then ../libexec/trimray, then PATH.
 /// Returns only when it cannot, with the exit code.

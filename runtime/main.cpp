@@ -85,8 +85,7 @@ int run(const std::vector<std::string>& arguments)
                "6 done but incomplete.\n'trimray COMMAND --help' describes a command.");
     app.require_subcommand(1);
     int exit_code = kExitOk;
-    for (const ExternalCommand& command : external_commands())
-        register_external(app, command);
+    register_externals(app);
     for (const auto register_command : {register_render, register_info, register_validate, register_thumbnail,
                                         register_export, register_preview, register_bench, register_version})
         register_command(app, exit_code);
@@ -97,8 +96,8 @@ int run(const std::vector<std::string>& arguments)
     }
     const std::string& name = arguments.front();
     for (const ExternalCommand& command : external_commands())
-        if (name == command.name)
-            return run_external(command, {arguments.begin() + 1, arguments.end()});
+        if (const size_t words = words_of(command, arguments); words > 0)
+            return run_external(command, {arguments.begin() + std::ptrdiff_t(words), arguments.end()});
     if (!name.starts_with("-") && find_command(app, name) == nullptr) {
         const std::string near = nearest_word(name, command_names(app));
         return usage_error("", fmt::format("no command '{}'", name),

@@ -1,7 +1,7 @@
 // The paper's own method for closest hits: hits that only ever come nearer, what its first frame loses and its later
 // ones find, on both tracers.
 #include "runtime/closest_errors.h"
-#include "runtime/leaf_budget.h"
+#include "runtime/derived_scene.h"
 #include "runtime/stochastic_frames.h"
 #include "tests/compare_frames.h"
 #include "tests/keep_vulkan_loaded.h"

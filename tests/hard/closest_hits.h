@@ -1,7 +1,7 @@
 // A scene's pictures by both tracers, scored against the reference for closest hits in the units of the hard cases.
 #pragma once
 
-#include "runtime/leaf_budget.h"
+#include "runtime/derived_scene.h"
 #include "tests/against_reference.h"
 #include "tests/keep_vulkan_loaded.h"
 

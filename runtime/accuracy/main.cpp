@@ -1,0 +1,187 @@
+// trimray-accuracy: `trimray bench accuracy` runs it. What each digit costs on given models, as a report.
+#include "format/pack_writer.h"
+#include "runtime/accuracy/report.h"
+#include "runtime/command_report.h"
+#include "runtime/command_trace.h"
+
+#include <CLI/CLI.hpp>
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <filesystem>
+#include <span>
+#include <string>
+#include <system_error>
+#include <unistd.h>
+#include <vector>
+
+namespace {
+using namespace trimray;
+namespace fs = std::filesystem;
+
+struct Arguments {
+    std::vector<std::string> packs;
+    std::string folder, size = "640x360";
+    uint32_t views = 3;
+    AccuracyOptions options;
+    bool json = false;
+};
+
+constexpr const char* kFooter =
+    "Each dial of the tracer is swept alone, then several together, from the same views; every picture is held "
+    "against\n"
+    "the reference in double. Pictures are timed in turns, on one thread by its processor time, so other programs\n"
+    "disturb little; the report says when times wobbled.\n"
+    "\nExamples:\n"
+    "  trimray bench accuracy model.tray -o report\n"
+    "  trimray bench accuracy part.tray board.tray -o report --quick --size 320x180\n"
+    "\nWrites report.json and report.csv.";
+
+/// As a shell takes it.
+std::string shell_word(const std::string& word)
+{
+    const bool plain = !word.empty() && word.find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ"
+                                                               "0123456789_-./,=:%+@") == std::string::npos;
+    if (plain)
+        return word;
+    std::string out = "'";
+    for (const char c : word)
+        out += c == '\'' ? std::string("'\\''") : std::string(1, c);
+    return out + '\'';
+}
+
+std::string command_line(int argc, char** argv)
+{
+    std::string line = "trimray bench accuracy";
+    for (int i = 1; i < argc; ++i)
+        line += ' ' + shell_word(argv[i]);
+    return line;
+}
+
+void show_progress(const std::string& text)
+{
+    if (isatty(STDERR_FILENO) != 0)
+        fmt::print(stderr, "\r\033[K{}", printable(text));
+}
+
+Result<ModelReport> measure_model(const std::string& pack, const AccuracyOptions& options, std::string& device)
+{
+    const Result<std::shared_ptr<const Scene>> scene = load_scene(pack);
+    if (!scene.ok())
+        return scene.error();
+    ModelReport report;
+    report.name = fs::path(pack).filename().string();
+    report.faces = uint32_t((*scene)->pack.image.faces.size());
+    report.instances = uint32_t((*scene)->pack.image.instances.size());
+    show_progress(report.name + ": cutting leaves, making textures");
+    const Result<std::vector<Contender>> contenders = make_contenders(*scene, options);
+    if (!contenders.ok())
+        return contenders.error();
+    device = contenders->front().tracer->device_name();
+    for (const Contender& contender : *contenders)
+        report.contenders.push_back({contender.dial, contender.name});
+    for (const std::string& name : options.views) {
+        Result<AccuracyView> view = measure_view(name, *scene, *contenders, options, [&](const std::string& text) {
+            show_progress(report.name + ": " + text);
+        });
+        if (!view.ok())
+            return view.error();
+        report.views.push_back(std::move(*view));
+    }
+    return report;
+}
+
+Status write_report(const AccuracyReport& report, const std::string& folder)
+{
+    const std::string json = report_json(report).dump(1, ' ', false, Json::error_handler_t::replace) + '\n';
+    for (const auto& [name, text] : {std::pair{"report.json", json}, std::pair{"report.csv", report_csv(report)}}) {
+        const auto bytes = std::as_bytes(std::span(text));
+        if (const Status written =
+                write_file_atomically((fs::path(folder) / name).string(), {bytes.begin(), bytes.end()});
+            !written.ok())
+            return written;
+    }
+    return Done{};
+}
+
+int run(Arguments arguments, const std::string& command)
+{
+    AccuracyOptions& options = arguments.options;
+    const Result<PictureSize> size = parse_size(arguments.size, 1);
+    if (!size.ok())
+        return report_error(size.error());
+    if (const Status known = check_choice(device_choice(), options.device); !known.ok())
+        return report_error(known.error());
+    options.width = size->width;
+    options.height = size->height;
+    if (options.quick)
+        options.rounds = std::min(options.rounds, 3u);
+    const std::vector<std::string> views{"iso", "top", "close-up", "front", "right", "back", "left", "bottom"};
+    options.views.assign(views.begin(), views.begin() + arguments.views);
+    std::error_code failed;
+    fs::create_directories(arguments.folder, failed);
+    if (failed)
+        return report_error({ErrorCode::FileNotWritable, arguments.folder,
+                             fmt::format("cannot be made: {}; choose another folder with -o", failed.message())});
+
+    AccuracyReport report{
+        command, fmt::format("{:%FT%TZ}", fmt::gmtime(std::chrono::system_clock::now())), "", options, {}};
+    for (const std::string& pack : arguments.packs) {
+        Result<ModelReport> model = measure_model(pack, options, report.device);
+        show_progress("");
+        if (!model.ok())
+            return report_error(model.error());
+        report.models.push_back(std::move(*model));
+        // after every model: what is measured is kept, whatever comes
+        if (const Status written = write_report(report, arguments.folder); !written.ok())
+            return report_error(written.error());
+    }
+    if (times_spread(report) > kBusySpread)
+        report_note(fmt::format("the machine was busy: times wobbled by {:.0f} %; measure again when it is idle",
+                                100 * times_spread(report)));
+    if (arguments.json)
+        print_json(report_json(report));
+    else
+        fmt::print("{}\n", (fs::path(arguments.folder) / "report.json").string());
+    return kExitOk;
+}
+
+} // namespace
+
+int main(int argc, char** argv)
+{
+    CLI::App app{"What accuracy costs in time and memory, measured on given models", "trimray bench accuracy"};
+    Arguments arguments;
+    app.add_option("PACK", arguments.packs, "Scene packs (.tray)")->required();
+    app.add_option("-o,--output", arguments.folder, "The report's folder; made where it is missing")->required();
+    app.add_flag("--quick", arguments.options.quick, "Fewer values a dial, three rounds at most");
+    app.add_option("--device", arguments.options.device, "cpu, vulkan or auto")->capture_default_str();
+    app.add_option("--views", arguments.views, "How many: iso, top, a close-up, front, right, back, left, bottom")
+        ->check(CLI::Range(1, 8))
+        ->capture_default_str();
+    app.add_option("--size", arguments.size, "WIDTHxHEIGHT in pixels")->capture_default_str();
+    app.add_option("--rounds", arguments.options.rounds, "How often each picture is timed")
+        ->check(CLI::Range(1u, 1000u))
+        ->capture_default_str();
+    app.add_option("--threads", arguments.options.threads, "CPU threads; 0: all cores")
+        ->check(CLI::Range(0u, 1024u))
+        ->capture_default_str();
+    app.add_flag("--json", arguments.json, "Print the report as one JSON object");
+    app.footer(kFooter);
+    try {
+        app.parse(argc, argv);
+    } catch (const CLI::ParseError& error) {
+        if (error.get_exit_code() == 0)
+            return app.exit(error);
+        return report_error({ErrorCode::Usage, "bench accuracy", fmt::format("{}; see --help", error.what())});
+    }
+    try {
+        return run(std::move(arguments), command_line(argc, argv));
+    } catch (const std::bad_alloc&) {
+        return report_error({ErrorCode::Internal, "", "out of memory; ask for smaller pictures"});
+    } catch (const std::exception& error) {
+        return report_error({ErrorCode::Internal, "", error.what()});
+    }
+}

@@ -1,0 +1,179 @@
+#include "runtime/accuracy/report.h"
+
+#include "runtime/median.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <thread>
+
+namespace trimray {
+namespace {
+
+constexpr int kSchema = 1;
+
+/// "model name" of /proc/cpuinfo.
+std::string cpu_name()
+{
+    std::ifstream file("/proc/cpuinfo");
+    for (std::string line; std::getline(file, line);)
+        if (line.starts_with("model name"))
+            if (const size_t colon = line.find(':'); colon != std::string::npos && colon + 2 <= line.size())
+                return line.substr(colon + 2);
+    return "unknown";
+}
+
+const char* compiler()
+{
+#ifdef __clang__
+    return "clang " __clang_version__;
+#else
+    return "gcc " __VERSION__;
+#endif
+}
+
+/// Third quartile less first, over the median.
+double relative_spread(std::vector<double> values)
+{
+    std::sort(values.begin(), values.end());
+    const size_t quarter = values.size() / 4;
+    return (values[values.size() - 1 - quarter] - values[quarter]) / median(values);
+}
+
+Json number(double value) // JSON has no infinity: an equal picture has null decibels
+{
+    return std::isfinite(value) ? Json(value) : Json();
+}
+
+double per_ray(uint64_t count, const WorkCounts& work)
+{
+    return work.rays > 0 ? double(count) / double(work.rays) : 0;
+}
+
+/// The numbers of a point by column: JSON and CSV have them from here.
+std::vector<std::pair<const char*, double>> numbers(const AccuracyPoint& point, const AccuracyOptions& options)
+{
+    const PictureErrors& e = point.errors;
+    const double ms = median(point.picture_ms);
+    const double pixels = double(options.width) * options.height;
+    return {{"picture_ms", ms},
+            {"picture_ms_spread", relative_spread(point.picture_ms)},
+            {"time_to_default", point.time_to_default},
+            {"rays_per_second", pixels / (ms * 1e-3)},
+            {"bytes", double(point.bytes)},
+            {"node_visits", per_ray(point.work.node_visits, point.work)},
+            {"leaf_visits", per_ray(point.work.leaf_visits, point.work)},
+            {"newton_steps", per_ray(point.work.newton_steps, point.work)},
+            {"curve_tests", per_ray(point.work.curve_tests, point.work)},
+            {"uncertified_pixels", double(point.work.uncertified_pixels)},
+            {"psnr_db", e.answers.psnr_db},
+            {"ssim", e.ssim},
+            {"wrong_per_million", e.wrong_per_million()},
+            {"missing", double(e.answers.missing)},
+            {"extra", double(e.answers.extra)},
+            {"wrong_depth", double(e.answers.wrong_depth)},
+            {"tangent", double(e.answers.tangent)},
+            {"leaks", double(e.leaks)},
+            {"depth_mm_mean", e.depth_mm.mean},
+            {"depth_mm_largest", e.depth_mm.largest},
+            {"depth_px_mean", e.depth_px.mean},
+            {"depth_px_at_99", e.depth_px.at_99},
+            {"depth_px_largest", e.depth_px.largest},
+            {"normal_deg_mean", e.normal_deg.mean},
+            {"normal_deg_at_99", e.normal_deg.at_99},
+            {"normal_deg_largest", e.normal_deg.largest},
+            {"outline_px_mean", e.outline_px.mean},
+            {"outline_px_largest", e.outline_px.largest}};
+}
+
+Json to_json(const Camera& camera)
+{
+    return {{"eye", camera.eye}, {"target", camera.target}, {"up", camera.up}, {"fov", camera.fov_deg}};
+}
+
+Json to_json(const ModelReport& model, const AccuracyOptions& options)
+{
+    Json object{{"model", model.name}, {"faces", model.faces}, {"instances", model.instances}, {"notes", model.notes}};
+    object["contenders"] = Json::array();
+    for (const ReportedContender& contender : model.contenders)
+        object["contenders"].push_back({{"dial", contender.dial}, {"name", contender.name}});
+    object["views"] = Json::array();
+    for (const AccuracyView& view : model.views) {
+        Json of_view{{"view", view.name}, {"camera", to_json(view.camera)}, {"points", Json::array()}};
+        for (const AccuracyPoint& point : view.points) {
+            Json row;
+            for (const auto& [name, value] : numbers(point, options))
+                row[name] = number(value);
+            of_view["points"].push_back(std::move(row));
+        }
+        object["views"].push_back(std::move(of_view));
+    }
+    return object;
+}
+
+/// As RFC 4180 quotes a field.
+std::string quoted(const std::string& field)
+{
+    std::string out = "\"";
+    for (const char c : field)
+        out += c == '"' ? std::string("\"\"") : std::string(1, c);
+    return out + '"';
+}
+
+} // namespace
+
+double times_spread(const AccuracyReport& report)
+{
+    std::vector<double> spreads;
+    for (const ModelReport& model : report.models)
+        for (const AccuracyView& view : model.views)
+            for (const AccuracyPoint& point : view.points)
+                if (point.picture_ms.size() >= 3)
+                    spreads.push_back(relative_spread(point.picture_ms));
+    return spreads.empty() ? 0 : median(std::move(spreads));
+}
+
+Json report_json(const AccuracyReport& report)
+{
+    const AccuracyOptions& options = report.options;
+    const double spread = times_spread(report);
+    Json object{{"schema", kSchema},
+                {"program", "trimray " TRIMRAY_VERSION},
+                {"compiler", compiler()},
+                {"command", report.command},
+                {"date", report.date},
+                {"machine", {{"cpu", cpu_name()}, {"threads", std::thread::hardware_concurrency()}}},
+                {"device", report.device},
+                {"width", options.width},
+                {"height", options.height},
+                {"threads", options.threads},
+                {"rounds", options.rounds},
+                {"times_spread", spread},
+                {"busy", spread > kBusySpread},
+                {"models", Json::array()}};
+    for (const ModelReport& model : report.models)
+        object["models"].push_back(to_json(model, options));
+    return object;
+}
+
+std::string report_csv(const AccuracyReport& report)
+{
+    std::string csv = "model,view,dial,contender";
+    for (const auto& [name, value] : numbers(AccuracyPoint{{1}, 1, {}, 0, {}}, report.options))
+        csv += fmt::format(",{}", name);
+    csv += '\n';
+    for (const ModelReport& model : report.models)
+        for (const AccuracyView& view : model.views)
+            for (size_t i = 0; i < view.points.size(); ++i) {
+                csv += fmt::format("{},{},{},{}", quoted(model.name), quoted(view.name),
+                                   quoted(model.contenders[i].dial), quoted(model.contenders[i].name));
+                for (const auto& [name, value] : numbers(view.points[i], report.options))
+                    csv += std::isfinite(value) ? fmt::format(",{}", value) : ",";
+                csv += '\n';
+            }
+    return csv;
+}
+
+} // namespace trimray

@@ -1,0 +1,45 @@
+// What an accuracy report holds, and its forms.
+#pragma once
+
+#include "runtime/accuracy/measure.h"
+#include "runtime/command_json.h"
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace trimray {
+
+/// A contender as the report names it.
+struct ReportedContender {
+    std::string dial, name;
+};
+
+struct ModelReport {
+    std::string name; // of the file, without its folder
+    uint32_t faces = 0, instances = 0;
+    std::vector<std::string> notes; // what was left out, and why
+    std::vector<ReportedContender> contenders;
+    std::vector<AccuracyView> views;
+};
+
+struct AccuracyReport {
+    std::string command; // that makes it again
+    std::string date;    // UTC, ISO 8601
+    std::string device;
+    AccuracyOptions options;
+    std::vector<ModelReport> models;
+};
+
+/// "report.json": `schema` counts up when a key changes its meaning. Documented in runtime/accuracy/REPORT.md.
+Json report_json(const AccuracyReport& report);
+
+/// One line a model, view and contender, after a line of column names; the same numbers as in the JSON.
+std::string report_csv(const AccuracyReport& report);
+
+/// Whether times wobbled: the median over all points of (third quartile - first) / median of a point's times.
+/// More than kBusySpread: the machine was busy. 0 with fewer than three rounds.
+double times_spread(const AccuracyReport& report);
+constexpr double kBusySpread = 0.05;
+
+} // namespace trimray
