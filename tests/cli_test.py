@@ -5,6 +5,7 @@ FOLDER holds trimray and, where the converter is built, trimray-pack; without it
 """
 
 import argparse
+import csv
 import json
 import math
 import os
@@ -808,6 +809,49 @@ class Bench(CliTest):
         self.assertEqual(set(map(tuple, shaders.values())), {("primary",)})
         self.assertEqual(rows["unspecialised"]["dispatches"], rows["none"]["dispatches"])
         self.assertGreater(rows["hard-shadows"]["dispatches"], rows["none"]["dispatches"])
+
+    def test_accuracy_sweeps_every_dial_and_keeps_the_numbers(self):
+        with tempfile.TemporaryDirectory() as root:
+            folder = Path(root) / "new" / "report"
+            options = ["--quick", "--size", "48x36", "--views", 2, "--rounds", 1]
+            report = self.json_of("bench", "accuracy", PACK, "-o", folder, *options, "--json")
+            kept = json.loads((folder / "report.json").read_text())
+            self.assertEqual(kept, report)
+            self.assertEqual((report["schema"], report["width"], report["height"], report["rounds"]), (1, 48, 36, 1))
+            self.assertIn(f"trimray bench accuracy {PACK} -o ", report["command"])
+            [model] = report["models"]
+            self.assertEqual(model["model"], PACK.name)
+            contenders = model["contenders"]
+            self.assertEqual(contenders[0], {"dial": "default", "name": "default"})
+            self.assertEqual({row["dial"] for row in contenders},
+                             {"default", "error-px", "leaves", "closest", "trims", "together", "precision"})
+            self.assertEqual(len({row["name"] for row in contenders}), len(contenders))
+            self.assertEqual([view["view"] for view in model["views"]], ["iso", "top"])
+            for view in model["views"]:
+                self.assertEqual(len(view["points"]), len(contenders))
+                self.assertEqual(view["points"][0]["time_to_default"], 1)
+                for point in view["points"]:
+                    self.assertGreater(point["picture_ms"], 0)
+                    self.assertGreater(point["bytes"], 0)
+                in_double = view["points"][-1]
+                self.assertEqual((in_double["psnr_db"], in_double["ssim"], in_double["wrong_per_million"]), (None, 1, 0))
+            rows = list(csv.DictReader((folder / "report.csv").read_text().splitlines()))
+            self.assertEqual(len(rows), 2 * len(contenders))
+            self.assertEqual(rows[0]["contender"], "default")
+            self.assertEqual(float(rows[1]["leaf_visits"]), model["views"][0]["points"][1]["leaf_visits"])
+
+    def test_accuracy_refuses_what_it_cannot_do(self):
+        with tempfile.TemporaryDirectory() as root:
+            missing = Path(root) / "missing.tray"
+            self.fails(2, "bench", "accuracy", missing, "-o", root, says=["missing.tray"])
+            self.fails(1, "bench", "accuracy", PACK, says=["bench accuracy", "--output", "--help"])
+            self.fails(1, "bench", "accuracy", PACK, "-o", root, "--views", 9, says=["--views"])
+            self.fails(1, "bench", "accuracy", PACK, "-o", root, "--device", "gpu", says=["--device", "gpu"])
+            file = Path(root) / "file"
+            file.write_text("")
+            self.fails(2, "bench", "accuracy", PACK, "-o", file / "report", says=["report", "-o"])
+            self.assertIn("accuracy", self.ok("bench", "--help").stdout)
+            self.assertIn("Examples:", self.ok("bench", "accuracy", "--help").stdout)
 
     def test_moving_measures_pictures_with_and_without_the_last_ones_hits(self):
         options = ["bench", "moving", PACK, "--size", "48x36", "--frames", 2, "--degrees", 3]
