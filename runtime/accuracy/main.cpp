@@ -37,7 +37,7 @@ constexpr const char* kFooter =
     "\nExamples:\n"
     "  trimray bench accuracy model.tray -o report\n"
     "  trimray bench accuracy part.tray board.tray -o report --quick --size 320x180\n"
-    "\nWrites report.json and report.csv.";
+    "\nWrites report.html, report.json and report.csv.";
 
 /// As a shell takes it.
 std::string shell_word(const std::string& word)
@@ -96,7 +96,8 @@ Result<ModelReport> measure_model(const std::string& pack, const AccuracyOptions
 Status write_report(const AccuracyReport& report, const std::string& folder)
 {
     const std::string json = report_json(report).dump(1, ' ', false, Json::error_handler_t::replace) + '\n';
-    for (const auto& [name, text] : {std::pair{"report.json", json}, std::pair{"report.csv", report_csv(report)}}) {
+    for (const auto& [name, text] : {std::pair{"report.json", json}, std::pair{"report.csv", report_csv(report)},
+                                     std::pair{"report.html", report_html(report)}}) {
         const auto bytes = std::as_bytes(std::span(text));
         if (const Status written =
                 write_file_atomically((fs::path(folder) / name).string(), {bytes.begin(), bytes.end()});
@@ -144,7 +145,7 @@ int run(Arguments arguments, const std::string& command)
     if (arguments.json)
         print_json(report_json(report));
     else
-        fmt::print("{}\n", (fs::path(arguments.folder) / "report.json").string());
+        fmt::print("{}\n", (fs::path(arguments.folder) / "report.html").string());
     return kExitOk;
 }
 

@@ -14,6 +14,10 @@ namespace {
 
 constexpr int kSchema = 1;
 
+const char kPage[] =
+#include "report.html.inc"
+    ;
+
 /// "model name" of /proc/cpuinfo.
 std::string cpu_name()
 {
@@ -156,6 +160,18 @@ Json report_json(const AccuracyReport& report)
     for (const ModelReport& model : report.models)
         object["models"].push_back(to_json(model, options));
     return object;
+}
+
+std::string report_html(const AccuracyReport& report)
+{
+    // "</script>" in a name must not end the script that the numbers are in
+    std::string numbers;
+    for (const char c : report_json(report).dump(-1, ' ', false, Json::error_handler_t::replace))
+        numbers += c == '<' ? std::string("\\u003c") : std::string(1, c);
+    constexpr std::string_view kPlace = "@REPORT@";
+    std::string page = kPage;
+    page.replace(page.find(kPlace), kPlace.size(), numbers);
+    return page;
 }
 
 std::string report_csv(const AccuracyReport& report)

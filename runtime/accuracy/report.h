@@ -37,6 +37,9 @@ Json report_json(const AccuracyReport& report);
 /// One line a model, view and contender, after a line of column names; the same numbers as in the JSON.
 std::string report_csv(const AccuracyReport& report);
 
+/// "report.html": the same numbers as a page of plots and tables, alone in its file: it needs no network.
+std::string report_html(const AccuracyReport& report);
+
 /// Whether times wobbled: the median over all points of (third quartile - first) / median of a point's times.
 /// More than kBusySpread: the machine was busy. 0 with fewer than three rounds.
 double times_spread(const AccuracyReport& report);
