@@ -1,5 +1,6 @@
 // The checks on decoded arrays. After them no index leaves its array, no walk is endless and no number is NaN or
 // infinite. SPEC.md, "What a reader checks", says the same in words; findings 32xx are these.
+#include "format/affine.h"
 #include "format/pack_file.h"
 #include "format/pack_reader.h"
 #include "format/trim_texture.h"
@@ -15,16 +16,12 @@ namespace {
 
 // Numbers in patch and part units are about 1; beyond this, products of three of them leave single precision.
 constexpr float kMaxMagnitude = 1e12f;
-// World coordinates: far above any model, far below where squares overflow.
-constexpr double kMaxMillimetres = 1e15;
 // Trim loops lie in [0,1]^2 up to rounding of their ends; inner control points of a monotone cubic may leave its hull
 // of ends by a third.
 constexpr float kTrimSlack = 1.0f / 1024;
 constexpr float kTrimControlLo = -1, kTrimControlHi = 2;
 // Axes are single-precision unit vectors: rounding is 1e-7, anything above this bound is not a rotation.
 constexpr float kAxisTolerance = 1e-4f;
-// Below this share of the product of its columns' lengths a determinant is rounding.
-constexpr double kSingularDeterminant = 1e-12;
 
 /// One finding for each number and section: the first fault in full, the rest counted.
 class Report {
@@ -214,13 +211,8 @@ private:
             report_.add(3202, "INST", fmt::format("instance {}: its transform is not finite", i));
             return;
         }
-        const double det = m[0] * (m[5] * m[10] - m[6] * m[9]) - m[1] * (m[4] * m[10] - m[6] * m[8]) +
-                           m[2] * (m[4] * m[9] - m[5] * m[8]);
-        double lengths = 1;
-        for (int c = 0; c < 3; ++c)
-            lengths *= std::sqrt(m[c] * m[c] + m[4 + c] * m[4 + c] + m[8 + c] * m[8 + c]);
-        if (!(std::abs(det) > kSingularDeterminant * lengths))
-            report_.add(3210, "INST", fmt::format("instance {}: determinant {}", i, det));
+        if (is_singular(m))
+            report_.add(3210, "INST", fmt::format("instance {}: determinant {}", i, determinant(m)));
     }
 
     /// Parts follow each other in every array they own, and faces in theirs.

@@ -35,6 +35,7 @@ enum class ErrorCode : int {
     InvalidSurface = 320,
     InvalidTrim = 321,
     InvalidScene = 330,
+    InvalidMesh = 340,
     UnsupportedFormat = 400,
     UnsupportedSurface = 401,
     UnsupportedPackFeature = 402,

@@ -284,8 +284,7 @@ void append_assembly(const CadModel& model, PackImage& image)
     }
 }
 
-void add_proxy(const CadModel& model, const std::vector<std::vector<uint>>& face_ids, PackImage& image,
-               BuildReport& report)
+void add_proxy(const CadModel& model, const FaceIds& face_ids, PackImage& image, BuildReport& report)
 {
     Result<std::vector<std::byte>> encoded = encode_proxy(collect_proxy(model, image, face_ids));
     if (encoded.ok())
@@ -294,7 +293,8 @@ void add_proxy(const CadModel& model, const std::vector<std::vector<uint>>& face
         report.warnings.push_back("no proxy mesh: " + encoded.error().detail);
 }
 
-void run(const CadModel& model, const BuildOptions& options, PackImage& image, BuildReport& report)
+void convert(const CadModel& model, const BuildOptions& options, PackImage& image, FaceIds& face_ids,
+             BuildReport& report)
 {
     std::vector<ConvertedFace> faces;
     std::vector<size_t> first_of_part;
@@ -330,7 +330,7 @@ void run(const CadModel& model, const BuildOptions& options, PackImage& image, B
         orientation_warnings[part] =
             find_rims(model.parts[part], std::span(faces).subspan(first, first_of_part[part + 1] - first));
     });
-    std::vector<std::vector<uint>> face_ids(model.parts.size());
+    face_ids.resize(model.parts.size());
     for (size_t part = 0; part < model.parts.size(); ++part) {
         PartRecord record{};
         record.origin_mm[0] = frames[part].origin_mm.x;
@@ -355,8 +355,24 @@ void run(const CadModel& model, const BuildOptions& options, PackImage& image, B
     }
     append_assembly(model, image);
     append_dropped(model, faces, image);
-    derive_leaves(image, options.leaves);
     report.convert_seconds = seconds_since(start);
+
+    report.converted = static_cast<uint32_t>(image.faces.size());
+    report.faces = report.converted + static_cast<uint32_t>(image.dropped.size());
+    report.warnings = model.warnings;
+    std::copy_if(orientation_warnings.begin(), orientation_warnings.end(), std::back_inserter(report.warnings),
+                 [](const std::string& warning) { return !warning.empty(); });
+    for (const ConvertedFace& face : faces)
+        if (face.dropped_reason.empty())
+            warn_of_weights(face, options.trims.tolerance, report.warnings);
+}
+
+void derive(const CadModel& model, const BuildOptions& options, const FaceIds& face_ids, PackImage& image,
+            BuildReport& report)
+{
+    auto start = Clock::now();
+    derive_leaves(image, options.leaves);
+    report.convert_seconds += seconds_since(start);
 
     start = Clock::now();
     derive_trees(image);
@@ -370,15 +386,6 @@ void run(const CadModel& model, const BuildOptions& options, PackImage& image, B
     derive_sdf(image);
     report.trims_seconds += seconds_since(start);
 
-    report.converted = static_cast<uint32_t>(image.faces.size());
-    report.faces = report.converted + static_cast<uint32_t>(image.dropped.size());
-    report.warnings = model.warnings;
-    std::copy_if(orientation_warnings.begin(), orientation_warnings.end(), std::back_inserter(report.warnings),
-                 [](const std::string& warning) { return !warning.empty(); });
-    for (const ConvertedFace& face : faces)
-        if (face.dropped_reason.empty())
-            warn_of_weights(face, options.trims.tolerance, report.warnings);
-
     start = Clock::now();
     if (!options.compact) // coarse triangles follow from the rest, and no thumbnail needs them
         add_proxy(model, face_ids, image, report);
@@ -387,16 +394,25 @@ void run(const CadModel& model, const BuildOptions& options, PackImage& image, B
 
 } // namespace
 
-PackImage build_pack(const CadModel& model, const BuildOptions& options, BuildReport& report)
+ConvertedFaces convert_faces(const CadModel& model, const BuildOptions& options, BuildReport& report)
 {
-    PackImage image;
+    ConvertedFaces out;
+    PackImage& image = out.image;
     image.compact = options.compact;
     image.leaf_options = options.leaves;
     image.provenance.source_format = model.source_format;
     image.provenance.source_unit = model.source_unit;
     tbb::task_arena arena(options.threads > 0 ? options.threads : tbb::task_arena::automatic);
-    arena.execute([&] { run(model, options, image, report); });
-    return image;
+    arena.execute([&] { convert(model, options, image, out.face_ids, report); });
+    return out;
+}
+
+PackImage build_pack(const CadModel& model, const BuildOptions& options, BuildReport& report)
+{
+    ConvertedFaces converted = convert_faces(model, options, report);
+    tbb::task_arena arena(options.threads > 0 ? options.threads : tbb::task_arena::automatic);
+    arena.execute([&] { derive(model, options, converted.face_ids, converted.image, report); });
+    return std::move(converted.image);
 }
 
 } // namespace trimray

@@ -6,6 +6,7 @@
 #include "format/pack_image.h"
 #include "format/result.h"
 #include "preprocess/cad_model.h"
+#include "preprocess/face_ids.h"
 #include "preprocess/trim_loop.h"
 
 #include <string>
@@ -34,6 +35,13 @@ struct BuildReport {
     std::vector<FaceFinding> trim_findings; // by part and face
     std::vector<std::string> warnings;
 };
+
+/// What build_pack makes first: the pack without what is derived from it (leaves, trees, cells, textures, proxy).
+struct ConvertedFaces {
+    PackImage image;
+    FaceIds face_ids;
+};
+ConvertedFaces convert_faces(const CadModel& model, const BuildOptions& options, BuildReport& report);
 
 /// Converts a model. Faces that cannot be converted end in image.dropped with a reason; nothing else is lost.
 PackImage build_pack(const CadModel& model, const BuildOptions& options, BuildReport& report);

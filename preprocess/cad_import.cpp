@@ -10,11 +10,13 @@
 #include <Standard_ErrorHandler.hxx>
 #include <Standard_Failure.hxx>
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <cmath>
 #include <csignal>
 #include <fmt/format.h>
+#include <limits>
 
 namespace trimray {
 namespace kernel {
@@ -88,15 +90,67 @@ std::optional<std::string> failure_of(const std::function<void()>& action)
     }
 }
 
-double diagonal_mm(const TopoDS_Shape& shape)
+std::optional<ShapeBox> box_of(const TopoDS_Shape& shape)
 {
     Bnd_Box box;
     BRepBndLib::AddClose(shape, box); // of vertices and poles: cheap, and large enough
     if (box.IsVoid())
         BRepBndLib::Add(shape, box, false);
     if (box.IsVoid() || box.IsOpen())
-        return 0;
-    return std::sqrt(box.SquareExtent());
+        return std::nullopt;
+    const gp_Pnt lo = box.CornerMin(), hi = box.CornerMax();
+    return ShapeBox{{lo.X(), lo.Y(), lo.Z()}, {hi.X(), hi.Y(), hi.Z()}};
+}
+
+double diagonal_mm(const TopoDS_Shape& shape)
+{
+    const std::optional<ShapeBox> box = box_of(shape);
+    return box ? std::hypot(box->hi[0] - box->lo[0], box->hi[1] - box->lo[1], box->hi[2] - box->lo[2]) : 0;
+}
+
+/// Diagonal of the box around the placed parts' boxes, mm.
+double diagonal_mm(const std::vector<PartShape>& parts, const std::vector<CadInstance>& instances)
+{
+    constexpr double kInf = std::numeric_limits<double>::infinity();
+    std::vector<std::optional<ShapeBox>> boxes;
+    for (const PartShape& part : parts)
+        boxes.push_back(box_of(part.shape));
+    std::array<double, 3> lo{kInf, kInf, kInf}, hi{-kInf, -kInf, -kInf};
+    for (const CadInstance& instance : instances) {
+        const std::optional<ShapeBox>& box = boxes[instance.part];
+        for (int corner = 0; box && corner < 8; ++corner)
+            for (size_t row = 0; row < 3; ++row) {
+                const double* m = &instance.transform[4 * row];
+                double x = m[3];
+                for (size_t c = 0; c < 3; ++c)
+                    x += m[c] * (corner >> c & 1 ? box->hi : box->lo)[c];
+                lo[row] = std::min(lo[row], x);
+                hi[row] = std::max(hi[row], x);
+            }
+    }
+    return lo[0] <= hi[0] ? std::hypot(hi[0] - lo[0], hi[1] - lo[1], hi[2] - lo[2]) : 0;
+}
+
+/// Fills the parts' meshes.
+void mesh_parts(const std::vector<PartShape>& parts, const ImportOptions& options, const Progress& progress,
+                CadModel& model)
+{
+    constexpr double kProxyAngle = 0.6; // ten segments a circle
+    constexpr double kMeshAngle = 0.5;
+    const auto start = std::chrono::steady_clock::now();
+    const bool is_proxy = !(options.mesh_deflection > 0);
+    if (!is_proxy)
+        model.mesh_deflection_mm = options.mesh_deflection * diagonal_mm(parts, model.instances);
+    for (size_t i = 0; i < parts.size(); ++i) {
+        const TopoDS_Shape& shape = parts[i].shape;
+        const MeshDetail detail = is_proxy
+                                      ? MeshDetail{options.proxy_deflection * diagonal_mm(shape), kProxyAngle, false}
+                                      : MeshDetail{model.mesh_deflection_mm, kMeshAngle, true};
+        mesh_part(shape, detail, model.parts[i], model.warnings);
+        if (progress)
+            progress("mesh", static_cast<double>(i + 1) / static_cast<double>(parts.size()));
+    }
+    model.mesh_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
 } // namespace kernel
@@ -151,15 +205,8 @@ Result<CadModel> import_cad(const std::string& path, const ImportOptions& option
     for (kernel::LoadedFile::LostFace& lost : file.lost_faces) // of no part that exists: named with the first
         model.dropped.push_back({0, next_face++, std::move(lost.name), std::move(lost.reason)});
     model.faces_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - faces_start).count();
-    if (options.proxy_deflection > 0) {
-        const auto start = std::chrono::steady_clock::now();
-        for (size_t i = 0; i < file.parts.size(); ++i) {
-            kernel::mesh_part(file.parts[i].shape, options.proxy_deflection, model.parts[i], model.warnings);
-            if (progress)
-                progress("mesh", static_cast<double>(i + 1) / static_cast<double>(file.parts.size()));
-        }
-        model.mesh_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    }
+    if (options.proxy_deflection > 0 || options.mesh_deflection > 0)
+        kernel::mesh_parts(file.parts, options, progress, model);
     return model;
 }
 

@@ -16,6 +16,7 @@ struct ImportOptions {
     double approximation_tolerance_mm = 0; // for offsets and the like; 0: 1e-6 of the part's size
     std::string name;                      // of the model, where the file gives none; empty: the file's, without ending
     double proxy_deflection = 0.02;        // of the proxy mesh, relative to the part's diagonal; 0: no mesh
+    double mesh_deflection = 0; // above 0: in the proxy's place a mesh with normals, relative to the model's diagonal
 };
 
 /// Called with a phase's name and its share done in [0,1], or a negative share where the kernel does not tell.

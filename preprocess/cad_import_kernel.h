@@ -16,6 +16,7 @@
 #include <TopoDS_Face.hxx>
 #include <TopoDS_Shape.hxx>
 
+#include <array>
 #include <functional>
 #include <optional>
 #include <string>
@@ -187,11 +188,23 @@ Result<std::vector<CadLoop>> collect_loops(const TopoDS_Face& face, const TopToo
 CadPart convert_part(const PartShape& source, uint32_t part_index, const ImportOptions& options,
                      std::vector<CadDroppedFace>& dropped, const Progress& progress);
 
-/// Fills part.mesh, of the faces that were converted; leaves it empty, with a warning, where the kernel fails.
-/// Units: deflection is relative to the part's diagonal.
-void mesh_part(const TopoDS_Shape& shape, double deflection, CadPart& part, std::vector<std::string>& warnings);
+/// How finely the kernel is to mesh.
+struct MeshDetail {
+    double deflection_mm;
+    double angle_rad; // between neighbouring segments
+    bool normals;     // of the surfaces, and positions about the middle of the part
+};
 
-/// Diagonal of the shape's box, mm; 0 for a void one.
+/// Fills part.mesh, of the faces that were converted; leaves it empty, with a warning, where the kernel fails.
+void mesh_part(const TopoDS_Shape& shape, const MeshDetail& detail, CadPart& part, std::vector<std::string>& warnings);
+
+/// The shape's box, mm; none where it is void or endless.
+struct ShapeBox {
+    std::array<double, 3> lo, hi;
+};
+std::optional<ShapeBox> box_of(const TopoDS_Shape& shape);
+
+/// Diagonal of the shape's box, mm; 0 where it has none.
 double diagonal_mm(const TopoDS_Shape& shape);
 
 /// Runs `action`, turning the kernel's exceptions and caught signals into a sentence; nothing if all went well.

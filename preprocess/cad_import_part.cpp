@@ -1,4 +1,4 @@
-// Parts: faces and edges of a shape, each face converted or dropped with a reason, and the triangles of the proxy mesh.
+// Parts: faces and edges of a shape, each face converted or dropped with a reason, and triangles.
 #include "preprocess/border_gap.h"
 #include "preprocess/cad_import_kernel.h"
 #include "preprocess/edge_class.h"
@@ -6,13 +6,16 @@
 #include <BRepMesh_IncrementalMesh.hxx>
 #include <BRepTools.hxx>
 #include <BRep_Tool.hxx>
+#include <GeomLib.hxx>
 #include <Poly_Triangulation.hxx>
+#include <Precision.hxx>
 #include <TopExp.hxx>
 #include <TopExp_Explorer.hxx>
 #include <TopLoc_Location.hxx>
 #include <TopoDS.hxx>
 #include <TopoDS_Edge.hxx>
 #include <TopoDS_Face.hxx>
+#include <gp_Vec.hxx>
 
 #include <algorithm>
 #include <cmath>
@@ -22,8 +25,6 @@
 
 namespace trimray::kernel {
 namespace {
-
-constexpr double kAngularDeflection = 0.6; // of the proxy mesh, radians: ten segments a circle
 
 Rect2d uv_bounds(const TopoDS_Face& face)
 {
@@ -82,6 +83,68 @@ ShapeMap<uint32_t> face_colors(const PartShape& source)
                     colors.Bind(face.Current(), source.colors.Find(holders(i)));
     }
     return colors;
+}
+
+/// Unit normals S_u x S_v at the triangulation's nodes, in the axes of the surface without the face's location. Where
+/// the surface has none that the kernel finds: the mean of the triangles' there.
+std::vector<gp_Vec> node_normals(const TopoDS_Face& face, const Poly_Triangulation& triangulation)
+{
+    TopLoc_Location location;
+    const Handle(Geom_Surface)& surface = BRep_Tool::Surface(face, location);
+    std::vector<gp_Vec> of_triangles(static_cast<size_t>(triangulation.NbNodes()));
+    for (int i = 1; i <= triangulation.NbTriangles(); ++i) {
+        int node[3];
+        triangulation.Triangle(i).Get(node[0], node[1], node[2]);
+        const gp_Pnt a = triangulation.Node(node[0]);
+        const gp_Vec across = gp_Vec(a, triangulation.Node(node[1])).Crossed(gp_Vec(a, triangulation.Node(node[2])));
+        for (const int n : node)
+            of_triangles[static_cast<size_t>(n - 1)] += across;
+    }
+    std::vector<gp_Vec> normals;
+    for (int i = 1; i <= triangulation.NbNodes(); ++i) {
+        const gp_Vec& mean = of_triangles[static_cast<size_t>(i - 1)];
+        gp_Dir normal;
+        constexpr int kFound = 1; // 0: a regular point, 1: a pole
+        if (triangulation.HasUVNodes() &&
+            GeomLib::NormEstim(surface, triangulation.UVNode(i), Precision::Confusion(), normal) <= kFound)
+            normals.emplace_back(normal);
+        else
+            normals.push_back(mean.SquareMagnitude() > 0 ? mean.Normalized() : gp_Vec(0, 0, 1));
+    }
+    return normals;
+}
+
+/// Appends the face's triangles, as far as the kernel made any.
+void append_triangles(const TopoDS_Face& face, uint32_t number, bool with_normals, CadMesh& mesh)
+{
+    TopLoc_Location location;
+    const Handle(Poly_Triangulation) triangulation = BRep_Tool::Triangulation(face, location);
+    if (triangulation.IsNull())
+        return;
+    const gp_Trsf transform = location.Transformation();
+    const bool reversed = face.Orientation() == TopAbs_REVERSED;
+    const auto first = static_cast<uint32_t>(mesh.positions.size() / 3);
+    for (int i = 1; i <= triangulation->NbNodes(); ++i) {
+        const gp_XYZ p = triangulation->Node(i).Transformed(transform).XYZ();
+        for (int c = 1; c <= 3; ++c)
+            mesh.positions.push_back(static_cast<float>(p.Coord(c) - mesh.origin_mm[static_cast<size_t>(c - 1)]));
+    }
+    if (with_normals)
+        for (const gp_Vec& normal : node_normals(face, *triangulation)) {
+            const gp_XYZ n = (reversed ? normal.Reversed() : normal).Transformed(transform).XYZ();
+            for (int c = 1; c <= 3; ++c)
+                mesh.normals.push_back(static_cast<float>(n.Coord(c)));
+        }
+    const bool flip = reversed != transform.IsNegative();
+    for (int i = 1; i <= triangulation->NbTriangles(); ++i) {
+        int a = 0, b = 0, c = 0;
+        triangulation->Triangle(i).Get(a, b, c);
+        if (flip)
+            std::swap(b, c);
+        for (const int node : {a, b, c})
+            mesh.triangles.push_back(first + static_cast<uint32_t>(node - 1));
+        mesh.triangle_face.push_back(number);
+    }
 }
 
 } // namespace
@@ -146,49 +209,34 @@ CadPart convert_part(const PartShape& source, uint32_t part_index, const ImportO
     return part;
 }
 
-void mesh_part(const TopoDS_Shape& shape, double deflection, CadPart& part, std::vector<std::string>& warnings)
+void mesh_part(const TopoDS_Shape& shape, const MeshDetail& detail, CadPart& part, std::vector<std::string>& warnings)
 {
-    const double diagonal = diagonal_mm(shape);
-    if (!(diagonal > 0))
+    if (!(detail.deflection_mm > 0))
         return;
     IMeshTools_Parameters parameters;
-    parameters.Deflection = deflection * diagonal;
-    parameters.Angle = kAngularDeflection;
+    parameters.Deflection = detail.deflection_mm;
+    parameters.Angle = detail.angle_rad;
     parameters.InParallel = true;
-    const auto failure = failure_of([&] { BRepMesh_IncrementalMesh mesh(shape, parameters); });
-    if (failure) {
-        warnings.push_back(fmt::format("part \"{}\": no proxy mesh: {}", part.name, *failure));
-        return;
-    }
-    TopTools_IndexedMapOfShape faces;
-    TopExp::MapShapes(shape, TopAbs_FACE, faces);
+    const char* what = detail.normals ? "mesh" : "proxy mesh";
     CadMesh& mesh = part.mesh;
-    for (size_t k = 0; k < part.faces.size(); ++k) {
-        const TopoDS_Face face = TopoDS::Face(faces(static_cast<int>(part.faces[k].face_in_part) + 1));
-        TopLoc_Location location;
-        const Handle(Poly_Triangulation) triangulation = BRep_Tool::Triangulation(face, location);
-        if (triangulation.IsNull())
-            continue;
-        const gp_Trsf transform = location.Transformation();
-        const auto first = static_cast<uint32_t>(mesh.positions.size() / 3);
-        for (int i = 1; i <= triangulation->NbNodes(); ++i) {
-            const gp_Pnt p = triangulation->Node(i).Transformed(transform);
-            for (const double x : {p.X(), p.Y(), p.Z()})
-                mesh.positions.push_back(static_cast<float>(x));
+    const auto failure = failure_of([&] {
+        BRepMesh_IncrementalMesh mesher(shape, parameters);
+        if (const auto box = box_of(shape); box && detail.normals)
+            for (size_t c = 0; c < 3; ++c)
+                mesh.origin_mm[c] = (box->lo[c] + box->hi[c]) / 2;
+        TopTools_IndexedMapOfShape faces;
+        TopExp::MapShapes(shape, TopAbs_FACE, faces);
+        for (size_t k = 0; k < part.faces.size(); ++k) {
+            const TopoDS_Face face = TopoDS::Face(faces(static_cast<int>(part.faces[k].face_in_part) + 1));
+            append_triangles(face, static_cast<uint32_t>(k), detail.normals, mesh);
         }
-        const bool flip = (face.Orientation() == TopAbs_REVERSED) != transform.IsNegative();
-        for (int i = 1; i <= triangulation->NbTriangles(); ++i) {
-            int a = 0, b = 0, c = 0;
-            triangulation->Triangle(i).Get(a, b, c);
-            if (flip)
-                std::swap(b, c);
-            for (const int node : {a, b, c})
-                mesh.triangles.push_back(first + static_cast<uint32_t>(node - 1));
-            mesh.triangle_face.push_back(static_cast<uint32_t>(k));
-        }
+    });
+    if (failure) {
+        mesh = {};
+        warnings.push_back(fmt::format("part \"{}\": no {}: {}", part.name, what, *failure));
+    } else if (mesh.triangles.empty()) {
+        warnings.push_back(fmt::format("part \"{}\": no {}: the kernel made no triangles", part.name, what));
     }
-    if (mesh.triangles.empty())
-        warnings.push_back(fmt::format("part \"{}\": no proxy mesh: the kernel made no triangles", part.name));
 }
 
 } // namespace trimray::kernel

@@ -108,9 +108,12 @@ struct CadDroppedFace {
     std::string name, reason;
 };
 
-/// Coarse triangles of a part, for the proxy. Units: mm, part axes. triangle_face is an index into CadPart::faces.
+/// Triangles of a part: coarse ones for the proxy, or those of a mesh (ImportOptions::mesh_deflection). Units: mm, part
+/// axes. triangle_face is an index into CadPart::faces.
 struct CadMesh {
-    std::vector<float> positions; // x, y, z
+    std::array<double, 3> origin_mm{}; // of the positions; the proxy's is 0
+    std::vector<float> positions;      // x, y, z
+    std::vector<float> normals;        // x, y, z; of the surface there, unit, outward; the proxy has none
     std::vector<uint32_t> triangles;
     std::vector<uint32_t> triangle_face;
 };
@@ -143,6 +146,7 @@ struct CadModel {
     std::vector<CadDroppedFace> dropped;
     std::vector<std::string> warnings;
     std::string source_format, source_unit; // "STEP AP214", "MM"
+    double mesh_deflection_mm = 0;          // of a mesh with normals
     double read_seconds = 0, transfer_seconds = 0, faces_seconds = 0, mesh_seconds = 0;
 };
 

@@ -1,10 +1,12 @@
-// trimray-pack: a CAD file in, a scene pack out. The work runs in a child process with limits on time and memory, since
-// damaged files make the CAD kernel crash or hang; this process parses, waits and reports.
+// trimray-pack: a CAD file in, a scene pack or a mesh out. The work runs in a child process with limits on time and
+// memory, since damaged files make the CAD kernel crash or hang; this process parses, waits and reports.
+#include "format/mesh_file.h"
 #include "format/pack_file.h"
 #include "format/pack_writer.h"
 #include "format/result.h"
 #include "preprocess/build_pack.h"
 #include "preprocess/cad_import.h"
+#include "preprocess/collect_mesh.h"
 #include "preprocess/dump_trims.h"
 #include "preprocess/preview.h"
 #include "preprocess/source_file.h"
@@ -38,7 +40,10 @@ struct Options {
     BuildOptions build;
     WorkerLimits limits;
     bool previews = true, json = false;
+    bool mesh = false; // else a pack
 };
+
+constexpr double kLargestDeflection = 0.1; // of the model's diagonal
 
 constexpr const char* kFooter =
     "MODEL is a STEP (.step, .stp), IGES (.iges, .igs) or BREP (.brep) file; it may be compressed (.zst).\n"
@@ -47,6 +52,7 @@ constexpr const char* kFooter =
     "  trimray-pack engine.step.zst -o engine.tray --trim-memory 100% --json\n"
     "  trimray-pack engine.step -o papers.tray --surfaces bezier --leaf-budget 1\n"
     "  trimray-pack board.stp -o board.tray --compact --timeout 600 --memory-limit 4GiB\n"
+    "  trimray-pack engine.step --mesh 1e-4 -o engine.trimesh\n"
     "\nExit codes: 0 done, 1 usage, 2 file not read or written, 3 invalid input, 4 unsupported, 5 internal,\n"
     "6 done but some faces were dropped (and named).";
 
@@ -104,7 +110,11 @@ Result<std::optional<Options>> parse_options(int argc, char** argv)
     app.footer(kFooter);
     app.set_version_flag("--version", "trimray-pack " TRIMRAY_VERSION);
     app.add_option("MODEL", options.model, "The CAD file")->required();
-    app.add_option("-o,--output", options.output, "The pack to write (.tray)")->required();
+    app.add_option("-o,--output", options.output, "The pack to write (.tray), or the mesh (.trimesh)")->required();
+    CLI::Option* mesh =
+        app.add_option("--mesh", options.import.mesh_deflection,
+                       "Write triangles instead of a pack, no farther from the surfaces than this share of the model's "
+                       "diagonal, with the faces, placements and colours of its pack");
     app.add_option("--surfaces", surfaces, "native: planes to tori keep their own form; bezier: all as splines")
         ->check(CLI::IsMember({"native", "bezier"}))
         ->capture_default_str();
@@ -142,6 +152,9 @@ Result<std::optional<Options>> parse_options(int argc, char** argv)
     app.add_option("--dump-trims", options.dump_folder, "Write each trimmed face's loops and distances as a picture");
     app.add_flag("--no-previews", no_previews, "Leave out the preview pictures");
     app.add_flag("--json", options.json, "Report as one JSON object");
+    for (const char* of_packs : {"--trim-memory", "--trim-source", "--trim-layout", "--leaf-slope", "--leaf-budget",
+                                 "--compact", "--dump-trims", "--no-previews"})
+        mesh->excludes(app.get_option(of_packs));
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {
@@ -161,6 +174,11 @@ Result<std::optional<Options>> parse_options(int argc, char** argv)
     options.build.trim_textures.source = source == "mask" ? TrimSource::Mask : TrimSource::Curve;
     options.build.trim_textures.layout = layout == "square" ? TrimLayout::Square : TrimLayout::Isotropic;
     options.previews = !no_previews;
+    options.mesh = mesh->count() > 0;
+    if (const double share = options.import.mesh_deflection;
+        options.mesh && !(share > 0 && share <= kLargestDeflection))
+        return Error{ErrorCode::Usage, "--mesh",
+                     fmt::format("{} is not above 0 and at most {}", share, kLargestDeflection)};
     return std::optional(options);
 }
 
@@ -264,23 +282,88 @@ Json finding_counts(const std::vector<FaceFinding>& findings)
     return counts;
 }
 
-/// The whole conversion; runs in the worker. Returns the report as JSON text.
-Result<std::string> convert(const Options& options, const SourceFile& source, const WorkerProgress& progress)
+/// Fails: as import_cad, at the model.
+Result<CadModel> import_model(const Options& options, const SourceFile& source, const WorkerProgress& progress)
 {
-    const auto start = Clock::now();
-    std::optional<tbb::global_control> threads;
-    if (options.build.threads > 0)
-        threads.emplace(tbb::global_control::max_allowed_parallelism, static_cast<size_t>(options.build.threads));
-
     ImportOptions import = options.import;
     import.name = source.name.substr(0, source.name.find_last_of('.'));
     Result<CadModel> model = import_cad(source.path, import, progress);
-    if (!model) {
-        Error error = model.error();
-        if (error.where == source.path)
-            error.where = options.model;
-        return error;
+    if (model)
+        return model;
+    Error error = model.error();
+    if (error.where == source.path)
+        error.where = options.model;
+    return error;
+}
+
+/// Fails: EmptyCad, where no face was converted.
+Status check_faces(const Options& options, const PackImage& image)
+{
+    if (!image.faces.empty())
+        return Done{};
+    std::string detail = fmt::format("none of its {} faces could be converted", image.dropped.size());
+    if (!image.dropped.empty())
+        detail += ", the first because: " + image.strings.strings[image.dropped.front().reason];
+    return Error{ErrorCode::EmptyCad, options.model, detail + "; try --heal"};
+}
+
+std::string report_text(const Json& json)
+{
+    return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+/// Instead of the pack the model's triangles. Returns the report as JSON text.
+Result<std::string> write_mesh(const Options& options, const SourceFile& source, const WorkerProgress& progress)
+{
+    const Result<CadModel> model = import_model(options, source, progress);
+    if (!model)
+        return model.error();
+    progress("convert", -1);
+    BuildReport report;
+    ConvertedFaces converted = convert_faces(*model, options.build, report);
+    if (const Status some = check_faces(options, converted.image); !some)
+        return some.error();
+    const Result<TriangleMesh> mesh = collect_mesh(*model, converted);
+    if (!mesh)
+        return mesh.error();
+    if (mesh->triangle_face.empty()) {
+        std::string detail = "the kernel made no triangles";
+        for (const std::string& warning : report.warnings)
+            detail += "; " + warning;
+        return Error{ErrorCode::EmptyCad, options.model, detail};
     }
+    progress("write", -1);
+    const auto write_start = Clock::now();
+    const std::vector<std::byte> bytes = encode_mesh(*mesh);
+    if (const Status written = write_file_atomically(options.output, bytes); !written)
+        return written.error();
+    const double write_seconds = seconds_since(write_start);
+
+    Json json;
+    json["source"] = source.name;
+    json["output"] = options.output;
+    json["faces"] = report.faces;
+    json["dropped"] = dropped_json(converted.image);
+    json["without_triangles"] = faces_without_triangles(*mesh);
+    json["triangles"] = mesh->triangle_face.size();
+    json["vertices"] = mesh->positions.size() / 3;
+    json["deflection_mm"] = mesh->deflection_mm;
+    json["seconds"] = {{"read", model->read_seconds},
+                       {"transfer", model->transfer_seconds},
+                       {"mesh", model->mesh_seconds},
+                       {"write", write_seconds}};
+    json["bytes"] = bytes.size();
+    json["warnings"] = report.warnings;
+    return report_text(json);
+}
+
+/// The whole conversion to a pack. Returns the report as JSON text.
+Result<std::string> convert(const Options& options, const SourceFile& source, const WorkerProgress& progress)
+{
+    const auto start = Clock::now();
+    const Result<CadModel> model = import_model(options, source, progress);
+    if (!model)
+        return model.error();
     progress("convert", -1);
     BuildReport report;
     PackImage image = build_pack(*model, options.build, report);
@@ -288,12 +371,8 @@ Result<std::string> convert(const Options& options, const SourceFile& source, co
     image.provenance.source_sha_or_xxh = source.hash;
     image.provenance.tool_version = "trimray-pack " TRIMRAY_VERSION;
     image.provenance.options_json = provenance_options(options);
-    if (image.faces.empty()) {
-        std::string detail = fmt::format("none of its {} faces could be converted", image.dropped.size());
-        if (!image.dropped.empty())
-            detail += ", the first because: " + image.strings.strings[image.dropped.front().reason];
-        return Error{ErrorCode::EmptyCad, options.model, detail + "; try --heal"};
-    }
+    if (const Status some = check_faces(options, image); !some)
+        return some.error();
     if (!options.dump_folder.empty()) {
         progress("dump", -1);
         if (const Status dumped = dump_trims(image, options.dump_folder); !dumped)
@@ -345,7 +424,16 @@ Result<std::string> convert(const Options& options, const SourceFile& source, co
     json["bytes"] = bytes.size();
     json["peak_memory_bytes"] = static_cast<uint64_t>(usage.ru_maxrss) * 1024;
     json["warnings"] = report.warnings;
-    return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+    return report_text(json);
+}
+
+/// What runs in the worker.
+Result<std::string> work(const Options& options, const SourceFile& source, const WorkerProgress& progress)
+{
+    std::optional<tbb::global_control> threads;
+    if (options.build.threads > 0)
+        threads.emplace(tbb::global_control::max_allowed_parallelism, static_cast<size_t>(options.build.threads));
+    return options.mesh ? write_mesh(options, source, progress) : convert(options, source, progress);
 }
 
 std::string size_text(double bytes)
@@ -357,9 +445,25 @@ std::string size_text(double bytes)
     return unit == 0 ? fmt::format("{:.0f} B", bytes) : fmt::format("{:.1f} {}", bytes, kUnits[unit]);
 }
 
+void row(const char* label, const std::string& text)
+{
+    fmt::print("{:<10} {}\n", label, text);
+}
+
+void print_seconds_and_dropped(const Json& report)
+{
+    std::string times;
+    for (const auto& [phase, seconds] : report["seconds"].items())
+        times += fmt::format("{}{} {:.2f}", times.empty() ? "" : ", ", phase, seconds.get<double>());
+    row("seconds", times);
+    for (const Json& face : report["dropped"])
+        row("dropped",
+            fmt::format("face {} of part {} \"{}\": {}", face["face"].get<size_t>(), face["part"].get<size_t>(),
+                        face["part_name"].get<std::string>(), face["reason"].get<std::string>()));
+}
+
 void print_table(const Json& report)
 {
-    const auto row = [](const char* label, const std::string& text) { fmt::print("{:<10} {}\n", label, text); };
     row("source",
         fmt::format("{} ({}, {}, {})", report["source"].get<std::string>(), report["source_format"].get<std::string>(),
                     report["source_unit"].get<std::string>(), size_text(report["source_bytes"])));
@@ -380,14 +484,18 @@ void print_table(const Json& report)
             findings += fmt::format("{}{} ({})", findings.empty() ? "" : ", ", name, count.get<size_t>());
     if (!findings.empty())
         row("", findings + "; --json names the faces");
-    std::string times;
-    for (const auto& [phase, seconds] : report["seconds"].items())
-        times += fmt::format("{}{} {:.2f}", times.empty() ? "" : ", ", phase, seconds.get<double>());
-    row("seconds", times);
-    for (const Json& face : report["dropped"])
-        row("dropped",
-            fmt::format("face {} of part {} \"{}\": {}", face["face"].get<size_t>(), face["part"].get<size_t>(),
-                        face["part_name"].get<std::string>(), face["reason"].get<std::string>()));
+    print_seconds_and_dropped(report);
+}
+
+void print_mesh_table(const Json& report)
+{
+    row("mesh", fmt::format("{} ({})", report["output"].get<std::string>(), size_text(report["bytes"])));
+    row("triangles",
+        fmt::format("{} with {} vertices, {:.3g} mm off the surfaces at most", report["triangles"].get<size_t>(),
+                    report["vertices"].get<size_t>(), report["deflection_mm"].get<double>()));
+    print_seconds_and_dropped(report);
+    for (const Json& face : report["without_triangles"])
+        row("missing", fmt::format("face {} of the pack: the kernel made no triangles", face.get<size_t>()));
 }
 
 /// Shows the phase on a terminal, nothing elsewhere.
@@ -421,7 +529,7 @@ int run(int argc, char** argv)
 
     const WorkerProgress progress = terminal_progress();
     const Result<std::string> answer = run_in_worker(
-        options.model, [&](const WorkerProgress& report) { return convert(options, *source, report); }, options.limits,
+        options.model, [&](const WorkerProgress& report) { return work(options, *source, report); }, options.limits,
         progress);
     if (progress)
         fmt::print(stderr, "\r\033[K");
@@ -434,9 +542,12 @@ int run(int argc, char** argv)
         fmt::print(stderr, "trimray-pack: {}: warning: {}\n", options.model, warning.get<std::string>());
     if (options.json)
         fmt::print("{}\n", *answer);
+    else if (options.mesh)
+        print_mesh_table(report);
     else
         print_table(report);
-    return report["dropped"].empty() ? kExitOk : kExitPartial;
+    const bool whole = report["dropped"].empty() && (!options.mesh || report["without_triangles"].empty());
+    return whole ? kExitOk : kExitPartial;
 }
 
 } // namespace

@@ -4,7 +4,7 @@
 
 namespace trimray {
 
-ProxyMesh collect_proxy(const CadModel& model, const PackImage& image, const std::vector<std::vector<uint>>& face_ids)
+ProxyMesh collect_proxy(const CadModel& model, const PackImage& image, const FaceIds& face_ids)
 {
     ProxyMesh proxy;
     for (size_t part = 0; part < model.parts.size(); ++part) {
@@ -12,8 +12,8 @@ ProxyMesh collect_proxy(const CadModel& model, const PackImage& image, const std
         const PartRecord& record = image.parts[part];
         const uint first_vertex = static_cast<uint>(proxy.positions.size() / 3);
         for (size_t i = 0; i < mesh.positions.size(); ++i)
-            proxy.positions.push_back(
-                static_cast<float>((mesh.positions[i] - record.origin_mm[i % 3]) / record.scale_mm));
+            proxy.positions.push_back(static_cast<float>(
+                (mesh.origin_mm[i % 3] + mesh.positions[i] - record.origin_mm[i % 3]) / record.scale_mm));
         for (size_t t = 0; t < mesh.triangle_face.size(); ++t) {
             const uint face = face_ids[part][mesh.triangle_face[t]];
             if (face == kNotConverted)

@@ -4,15 +4,11 @@
 #include "format/pack_image.h"
 #include "format/proxy.h"
 #include "preprocess/cad_model.h"
-
-#include <vector>
+#include "preprocess/face_ids.h"
 
 namespace trimray {
 
-/// A face that was not converted has no id in the pack.
-inline constexpr uint kNotConverted = 0xffffffffu;
-
-/// Returns the triangles of converted faces. face_ids[part][face in CadPart::faces] is the face's id in the pack.
-ProxyMesh collect_proxy(const CadModel& model, const PackImage& image, const std::vector<std::vector<uint>>& face_ids);
+/// Returns the triangles of converted faces.
+ProxyMesh collect_proxy(const CadModel& model, const PackImage& image, const FaceIds& face_ids);
 
 } // namespace trimray

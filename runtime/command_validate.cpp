@@ -1,4 +1,5 @@
 #include "format/pack_reader.h"
+#include "format/read_file.h"
 #include "runtime/command_json.h"
 #include "runtime/command_report.h"
 #include "runtime/commands.h"
@@ -6,9 +7,6 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
-#include <cerrno>
-#include <cstdio>
-#include <cstring>
 #include <memory>
 #include <vector>
 
@@ -19,29 +17,6 @@ struct ValidateArguments {
     std::string pack;
     bool json = false;
 };
-
-/// The whole file. Fails: FileNotFound, FileNotReadable.
-Result<std::vector<std::byte>> read_file(const std::string& path)
-{
-    std::vector<std::byte> bytes;
-    std::FILE* file = std::fopen(path.c_str(), "rb");
-    if (file == nullptr)
-        return Error{errno == ENOENT ? ErrorCode::FileNotFound : ErrorCode::FileNotReadable, path,
-                     fmt::format("{}; check the name", std::strerror(errno))};
-    constexpr size_t kChunk = size_t{1} << 20;
-    size_t got = 0;
-    do {
-        const size_t had = bytes.size();
-        bytes.resize(had + kChunk);
-        got = std::fread(bytes.data() + had, 1, kChunk, file);
-        bytes.resize(had + got);
-    } while (got == kChunk);
-    const int failure = std::ferror(file) != 0 ? errno : 0;
-    std::fclose(file);
-    if (failure != 0)
-        return Error{ErrorCode::FileNotReadable, path, fmt::format("{}; check the file", std::strerror(failure))};
-    return bytes;
-}
 
 int run_validate(const ValidateArguments& arguments)
 {

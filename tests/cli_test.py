@@ -924,6 +924,29 @@ class Pack(CliTest):
         self.ok("pack", MODEL, "-o", WORK / "same.tray")
         self.assertEqual(PACK.read_bytes(), (WORK / "same.tray").read_bytes())
 
+    def test_writes_a_mesh_in_a_packs_place(self):
+        out = WORK / "model.trimesh"
+        sizes = {}
+        for deflection in ["1e-2", "1e-4"]:
+            report = self.json_of("pack", MODEL, "--mesh", deflection, "-o", out, "--json")
+            self.assertEqual((report["faces"], report["dropped"], report["without_triangles"]), (29, [], []))
+            self.assertEqual(set(report["seconds"]), {"read", "transfer", "mesh", "write"})
+            self.assertEqual(report["bytes"], out.stat().st_size)
+            sizes[deflection] = report
+        coarse, fine = sizes["1e-2"], sizes["1e-4"]
+        self.assertGreater(fine["triangles"], 2 * coarse["triangles"])
+        self.assertAlmostEqual(coarse["deflection_mm"] / fine["deflection_mm"], 100)
+        self.assertRegex(self.ok("pack", MODEL, "--mesh", "1e-2", "-o", out).stdout, r"\ntriangles +\d+ with \d+ vertices")
+
+    def test_a_mesh_takes_no_options_of_packs(self):
+        out = WORK / "none.trimesh"
+        for options in [["--compact"], ["--trim-memory", "50%"], ["--leaf-budget", "1"], ["--no-previews"]]:
+            self.fails(1, "pack", MODEL, "--mesh", "1e-3", "-o", out, *options, says=["--mesh", options[0]])
+        for deflection in ["0", "-1e-3", "0.2", "nan", "fine"]:
+            self.fails(1, "pack", MODEL, f"--mesh={deflection}", "-o", out, says=["--mesh"])
+        self.fails(3, "pack", MODEL, "--mesh", "1e-12", "-o", out, says=["no triangles"]) # finer than the kernel goes
+        self.assertFalse(out.exists())
+
     def test_errors_have_their_exit_codes(self):
         self.assertEqual(run("pack").returncode, 1)
         self.assertEqual(run("pack", MODEL, "-o", WORK / "x.tray", "--frob").returncode, 1)
