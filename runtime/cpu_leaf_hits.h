@@ -11,10 +11,11 @@
 #include "runtime/cpu_fetch.h"
 #include "runtime/cpu_lanes.h"
 #include "runtime/cpu_leaf_roots.h"
-#include "runtime/cpu_stochastic.h"
 #include "runtime/cpu_trim.h"
 #include "runtime/cpu_trim_reference.h"
 #include "runtime/cpu_write.h"
+#include "runtime/face_uv.h"
+#include "runtime/plain_newton.h"
 #include "shaders/shared/leaf_start.h"
 #include "shaders/shared/quadric.h"
 #include "shaders/shared/rim.h"
@@ -369,24 +370,14 @@ private:
         return lanes_of(doubtful);
     }
 
-    /// But for the torus' second angle, which is unwrapped.
-    HWY_ATTR static real2 face_uv(const PatchRecord& patch, real2 uv_patch)
-    {
-        return real2(patch.uv_offset[0] + patch.uv_scale[0] * uv_patch.x,
-                     patch.uv_offset[1] + patch.uv_scale[1] * uv_patch.y);
-    }
-
     /// Takes the roots that lie in the face's domain and inside its trims.
     HWY_ATTR HWY_INLINE void offer(Target& target, mask near, real t, real2 uv_patch, real3 normal, PacketHit& hit)
     {
         const PatchRecord& patch = target.patch;
         real2 uv = face_uv(patch, uv_patch);
-        if ((patch.shape & 0xffu) == kKindTorus) {
-            // pack_layout.h: the torus' v is unwrapped upwards
-            const float half_turn = kPi * patch.uv_scale[1];
-            uv.y = select(uv.y < 0.5f - half_turn, uv.y + 2.0f * half_turn, uv.y);
-        }
-        mask taken = near && abs(uv.x - 0.5f) <= 0.5f + kDomainSlack && abs(uv.y - 0.5f) <= 0.5f + kDomainSlack;
+        if ((patch.shape & 0xffu) == kKindTorus)
+            uv = unwrapped(patch, uv);
+        mask taken = near && in_slack_domain(uv);
         if (!any_lane(taken))
             return;
         uv = clamp_to_domain(uv);

@@ -9,6 +9,7 @@
 
 #include "runtime/cpu_evaluate.h"
 #include "runtime/cpu_fetch.h"
+#include "runtime/patch_normal.h"
 #include "shaders/shared/leaf_proof.h"
 
 #include <algorithm>
@@ -136,22 +137,7 @@ struct Root {
 /// a pole or along a degenerate side the one a little way inside.
 FN_LARGE real3 patch_normal(const NewtonPatch& newton, SurfacePoint s, real2 uv, mask asked)
 {
-    const real2 within(clamp(uv.x, real(0.0f), real(1.0f)), clamp(uv.y, real(0.0f), real(1.0f)));
-    // beyond a side that is one point the patch is turned inside out
-    const mask beyond = asked && !(within.x == uv.x && within.y == uv.y);
-    if (any_lane(beyond)) {
-        const SurfacePoint side = newton.at(within);
-        s.du = select(beyond, side.du, s.du);
-        s.dv = select(beyond, side.dv, s.dv);
-    }
-    const real3 normal = cross(s.du, s.dv);
-    const mask flat = dot(normal, normal) <= 1e-10f * dot(s.du, s.du) * dot(s.dv, s.dv) ||
-                      dot(s.du, s.du) <= 1e-10f * dot(s.dv, s.dv) || dot(s.dv, s.dv) <= 1e-10f * dot(s.du, s.du);
-    if (!any_lane(asked && flat))
-        return normal;
-    constexpr float kInwards = 1.0f / 2048;
-    const SurfacePoint inside = newton.at(within + real2(0.5f - within.x, 0.5f - within.y) * real(kInwards));
-    return select(flat, cross(inside.du, inside.dv), normal);
+    return bezier_normal([&](real2 at) HWY_ATTR { return newton.at(at); }, s, uv, asked);
 }
 
 /// What the search ended at; accepted anywhere on the patch, so that leaves leave no gaps.

@@ -11,6 +11,7 @@
 #include "runtime/cpu_fetch.h"
 #include "runtime/cpu_lanes.h"
 #include "runtime/cpu_native.h"
+#include "runtime/patch_normal.h"
 #include "shaders/shared/bezier_derivatives.h"
 #include "shaders/shared/curvature.h"
 #include "shaders/shared/derivatives.h"
@@ -47,19 +48,6 @@ HWY_INLINE scalar3 scalar3_of(const float (&v)[3])
 HWY_INLINE scalar3 scalar3_of(const double (&v)[3])
 {
     return scalar3(float(v[0]), float(v[1]), float(v[2]));
-}
-
-/// 1, or -1 where the outward normal is opposite to the patch's S_u x S_v in right-handed axes.
-static inline float outward_turn(const CpuScene& scene, uint patch_id)
-{
-    const FaceRecord& face = scene.image.faces[scene.image.patches[patch_id].face];
-    return ((face.flags & kFaceReversed) != 0) != (scene.left_handed[patch_id] != 0) ? -1.0f : 1.0f;
-}
-
-FN real3 to_world(const float (&m)[3][3], real3 n)
-{
-    return real3(m[0][0] * n.x + m[0][1] * n.y + m[0][2] * n.z, m[1][0] * n.x + m[1][1] * n.y + m[1][2] * n.z,
-                 m[2][0] * n.x + m[2][1] * n.y + m[2][2] * n.z);
 }
 
 FN PatchHits patch_hits(const MapHits& hits, const PatchRecord& patch, const PatchView& view)

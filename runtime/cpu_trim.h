@@ -8,6 +8,7 @@
 
 #include "runtime/cpu_fetch.h"
 #include "runtime/cpu_trim_kd.h"
+#include "runtime/face_uv.h"
 #include "runtime/tracer.h"
 #include "shaders/shared/trim_lookup.h"
 
@@ -49,11 +50,6 @@ FN mask inside_by_cells(const FetchSource& source, const TrimFace& trim, real2 u
             inside = inside || here;
     }
     return inside;
-}
-
-FN real2 clamp_to_domain(real2 uv)
-{
-    return real2(clamp(uv.x, real(0.0f), real(kUvBelowOne)), clamp(uv.y, real(0.0f), real(kUvBelowOne)));
 }
 
 /// Lanes of `asked` for which the rectangle around uv with half sides `width` holds no trim: it lies in one cell and

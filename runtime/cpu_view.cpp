@@ -342,6 +342,17 @@ View make_single_ray_view(const PackImage& image, const std::array<double, 3>& o
     return view;
 }
 
+InstanceView world_view(const PackImage& image, const View& view)
+{
+    InstanceRecord world{};
+    world.transform[0] = world.transform[5] = world.transform[10] = 1;
+    PartRecord unit{};
+    for (int i = 0; i < 3; ++i)
+        unit.origin_mm[i] = image.world_origin_mm[i];
+    unit.scale_mm = image.world_scale_mm;
+    return view_from(world, unit, view);
+}
+
 void collect_candidates(const CpuScene& scene, const View& view, const PixelRect& rect, CandidateScratch& scratch,
                         std::vector<Candidate>& out, WorkCounts& work)
 {
@@ -364,14 +375,7 @@ void collect_candidates(const CpuScene& scene, const View& view, const PixelRect
     if (view.alone || image.instances.size() == 1) {
         enter(view.alone.value_or(0));
     } else if (!image.top_nodes.empty()) {
-        // the world's unit space seen as an instance
-        InstanceRecord world{};
-        world.transform[0] = world.transform[5] = world.transform[10] = 1;
-        PartRecord unit{};
-        for (int i = 0; i < 3; ++i)
-            unit.origin_mm[i] = image.world_origin_mm[i];
-        unit.scale_mm = image.world_scale_mm;
-        walk(image.top_nodes.data(), Frustum(view_from(world, unit, view), rect), scratch.stack, work, enter);
+        walk(image.top_nodes.data(), Frustum(world_view(image, view), rect), scratch.stack, work, enter);
     }
     std::sort(out.begin(), out.end(), [](const Candidate& a, const Candidate& b) {
         if (a.near_mm != b.near_mm)

@@ -80,6 +80,9 @@ View make_view(const PackImage& image, const CameraRays& rays, uint32_t width, u
 View make_single_ray_view(const PackImage& image, const std::array<double, 3>& origin_mm,
                           const std::array<double, 3>& direction);
 
+/// The top tree's units seen as an instance's part.
+InstanceView world_view(const PackImage& image, const View& view);
+
 /// A rectangle of the picture, in pixels from its centre.
 struct PixelRect {
     float x0, x1, y0, y1;

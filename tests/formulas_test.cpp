@@ -277,7 +277,7 @@ TEST(formulas, patches_of_small_degree_give_the_bits_of_the_general_formula)
             }
         }
     }
-    EXPECT_EQ(fixed, 12);
+    EXPECT_EQ(fixed, 18);
 }
 
 // A native surface as pack_layout.h has it, in double.
