@@ -10,13 +10,15 @@
 //   select(m, a, b)     m ? a : b, lane by lane; both sides are computed
 //   any_lane(m)         m in GLSL; true if any of the 16 lanes is, so `any_lane` may end a loop but not choose a value
 //
+// C++ that defines TRIMRAY_ONE_RAY before it includes anything has one ray instead of 16 lanes: its types are GLSL's.
+//
 // A scalar goes wherever a real does. The 16 lanes are the same on every instruction set and nothing is fused or
 // approximated, so the CPU tracer gives the same bits on all of them. PRECISE stands before a value that a comparison
 // decides on: GLSL must not fuse or reorder it either. No trigonometry on a path that decides: see angle_of.
 //
 // FN opens a function; FN_LARGE one that C++ must not inline, for it is long and called often.
 // STOP_PAST_DEGREES(i); ends a loop that `i` counts up to a degree, for drivers unroll loops whose longest is known
-// when they compile; C++ has functions of their own for common degrees (runtime/cpu_evaluate.h). FETCH_PARAM and
+// when they compile; C++ has functions of their own for common degrees (runtime/common_degrees.h). FETCH_PARAM and
 // FETCH_PASS carry the source of fetch_* functions: an argument in C++, buffers in GLSL, nothing there.
 #if defined(TRIMRAY_SHARED_LANGUAGE_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef TRIMRAY_SHARED_LANGUAGE_H
@@ -26,7 +28,11 @@
 #endif
 
 #ifdef __cplusplus
+#ifdef TRIMRAY_ONE_RAY
+#include "shaders/shared/language_one_ray.h"
+#else
 #include "shaders/shared/language_lanes.h"
+#endif
 #else
 
 #define SHARED_OPEN
