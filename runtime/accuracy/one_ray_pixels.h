@@ -5,6 +5,7 @@
 #include "runtime/face_colors.h"
 #include "shaders/shared/shading.h"
 
+#include <algorithm>
 #include <limits>
 
 SHARED_OPEN

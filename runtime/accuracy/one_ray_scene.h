@@ -2,6 +2,10 @@
 // them.
 #pragma once
 
+#ifndef TRIMRAY_ONE_RAY
+#error "the shared formulas must be those for one ray: define TRIMRAY_ONE_RAY before all includes"
+#endif
+
 #include "format/pack_image.h"
 #include "runtime/common_degrees.h"
 #include "runtime/cpu_fetch.h"

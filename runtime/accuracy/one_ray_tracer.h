@@ -1,5 +1,7 @@
 // The paper's shape of tracer, to measure ours against: one ray at a time in scalar code, Newton from the middle of
-// each leaf, trims by kd-trees.
+// each leaf, trims by kd-trees. Nodes and leaves are unpacked at load, and loops over control points compiled for the
+// degrees that models are made of. It is compiled for the same processors as all that is not in lanes; for the one that
+// it ran on (-march=native) it was 5 to 7 % faster.
 // Source: Kunts et al., the base method; Sloup & Havran, "Optimizing Ray Tracing of Trimmed NURBS Surfaces on the GPU",
 // CGF 2021.
 #pragma once
