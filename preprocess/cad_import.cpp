@@ -72,6 +72,12 @@ std::string trimmed_message(const char* text)
     return message;
 }
 
+double diagonal(const std::array<double, 3>& lo, const std::array<double, 3>& hi)
+{
+    const double x = hi[0] - lo[0], y = hi[1] - lo[1], z = hi[2] - lo[2];
+    return std::sqrt(x * x + y * y + z * z);
+}
+
 } // namespace
 
 std::optional<std::string> failure_of(const std::function<void()>& action)
@@ -105,7 +111,7 @@ std::optional<ShapeBox> box_of(const TopoDS_Shape& shape)
 double diagonal_mm(const TopoDS_Shape& shape)
 {
     const std::optional<ShapeBox> box = box_of(shape);
-    return box ? std::hypot(box->hi[0] - box->lo[0], box->hi[1] - box->lo[1], box->hi[2] - box->lo[2]) : 0;
+    return box ? diagonal(box->lo, box->hi) : 0;
 }
 
 /// Diagonal of the box around the placed parts' boxes, mm.
@@ -128,7 +134,7 @@ double diagonal_mm(const std::vector<PartShape>& parts, const std::vector<CadIns
                 hi[row] = std::max(hi[row], x);
             }
     }
-    return lo[0] <= hi[0] ? std::hypot(hi[0] - lo[0], hi[1] - lo[1], hi[2] - lo[2]) : 0;
+    return lo[0] <= hi[0] ? diagonal(lo, hi) : 0;
 }
 
 /// Fills the parts' meshes.

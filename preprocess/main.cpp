@@ -111,10 +111,10 @@ Result<std::optional<Options>> parse_options(int argc, char** argv)
     app.set_version_flag("--version", "trimray-pack " TRIMRAY_VERSION);
     app.add_option("MODEL", options.model, "The CAD file")->required();
     app.add_option("-o,--output", options.output, "The pack to write (.tray), or the mesh (.trimesh)")->required();
-    CLI::Option* mesh =
-        app.add_option("--mesh", options.import.mesh_deflection,
-                       "Write triangles instead of a pack, no farther from the surfaces than this share of the model's "
-                       "diagonal, with the faces, placements and colours of its pack");
+    CLI::Option* mesh = app.add_option(
+        "--mesh", options.import.mesh_deflection,
+        "Write triangles instead of a pack, with its faces, placements and colours; the CAD kernel is to keep "
+        "them as near the surfaces as this share of the model's diagonal");
     app.add_option("--surfaces", surfaces, "native: planes to tori keep their own form; bezier: all as splines")
         ->check(CLI::IsMember({"native", "bezier"}))
         ->capture_default_str();
@@ -490,9 +490,9 @@ void print_table(const Json& report)
 void print_mesh_table(const Json& report)
 {
     row("mesh", fmt::format("{} ({})", report["output"].get<std::string>(), size_text(report["bytes"])));
-    row("triangles",
-        fmt::format("{} with {} vertices, {:.3g} mm off the surfaces at most", report["triangles"].get<size_t>(),
-                    report["vertices"].get<size_t>(), report["deflection_mm"].get<double>()));
+    row("triangles", fmt::format("{} with {} vertices, meant to lie within {:.3g} mm of the surfaces",
+                                 report["triangles"].get<size_t>(), report["vertices"].get<size_t>(),
+                                 report["deflection_mm"].get<double>()));
     print_seconds_and_dropped(report);
     for (const Json& face : report["without_triangles"])
         row("missing", fmt::format("face {} of the pack: the kernel made no triangles", face.get<size_t>()));

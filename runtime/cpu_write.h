@@ -305,20 +305,13 @@ HWY_ATTR HWY_INLINE real3 look_at(const BlockJob& job, const Packet& packet, con
     return select(glows, surface, color);
 }
 
-/// The pixels of hits. kLook: the job may have materials or a map. Light: PacketLight (runtime/cpu_light.h); null where
-/// there is the light at the eye alone. Caps are hits without a leaf; null where there are none. Values of maps that
-/// measure go to (x, y) of the strip, if there is one.
+/// Fills what `seen`, which has its hits, shows of hits whose look in the world is known. surface_lanes: those that are
+/// no caps. Other arguments: see_packet's.
 template <bool kLook, class Light>
-HWY_ATTR HWY_INLINE SeenPacket see_packet(const BlockJob& job, const Packet& packet, const PacketHit& hit,
-                                          const PacketCaps* caps, Light* light, uint32_t x, uint32_t y, Strip* strip)
+HWY_ATTR HWY_INLINE void see_shading(const BlockJob& job, const Packet& packet, const PacketHit& hit,
+                                     const PacketShading& shading, uint surface_lanes, Light* light, uint32_t x,
+                                     uint32_t y, Strip* strip, SeenPacket& seen)
 {
-    SeenPacket seen;
-    seen.hits = packet.alive && hit.best < kHuge;
-    const uint hit_lanes = lane_bits(seen.hits);
-    const uint surface_lanes = caps ? hit_lanes & ~lane_bits(caps->here) : hit_lanes;
-    PacketShading shading = shade_leaves<kLook>(job, hit, surface_lanes);
-    if (caps)
-        show_caps(*caps, shading);
     const View& view = job.view;
     const scalar3 w0(float(view.w0[0]), float(view.w0[1]), float(view.w0[2]));
     const scalar3 step_x(float(view.step_x[0]), float(view.step_x[1]), float(view.step_x[2]));
@@ -344,6 +337,23 @@ HWY_ATTR HWY_INLINE SeenPacket see_packet(const BlockJob& job, const Packet& pac
     seen.face = shading.face;
     seen.instance = hit.instance;
     seen.certified = hit.doubt >= kHuge || hit.doubt > hit.best;
+}
+
+/// The pixels of hits. kLook: the job may have materials or a map. Light: PacketLight (runtime/cpu_light.h); null where
+/// there is the light at the eye alone. Caps are hits without a leaf; null where there are none. Values of maps that
+/// measure go to (x, y) of the strip, if there is one.
+template <bool kLook, class Light>
+HWY_ATTR HWY_INLINE SeenPacket see_packet(const BlockJob& job, const Packet& packet, const PacketHit& hit,
+                                          const PacketCaps* caps, Light* light, uint32_t x, uint32_t y, Strip* strip)
+{
+    SeenPacket seen;
+    seen.hits = packet.alive && hit.best < kHuge;
+    const uint hit_lanes = lane_bits(seen.hits);
+    const uint surface_lanes = caps ? hit_lanes & ~lane_bits(caps->here) : hit_lanes;
+    PacketShading shading = shade_leaves<kLook>(job, hit, surface_lanes);
+    if (caps)
+        show_caps(*caps, shading);
+    see_shading<kLook>(job, packet, hit, shading, surface_lanes, light, x, y, strip, seen);
     return seen;
 }
 
