@@ -5,8 +5,10 @@
 #include <fmt/format.h>
 
 #include <cerrno>
+#include <cstdlib>
 #include <cstring>
 #include <filesystem>
+#include <sstream>
 #include <unistd.h>
 
 namespace trimray {
@@ -42,33 +44,41 @@ void register_externals(CLI::App& app, const std::string& parent)
     }
 }
 
+Result<std::string> find_program(const std::string& program)
+{
+    std::error_code failed;
+    const fs::path own = fs::read_symlink("/proc/self/exe", failed);
+    if (!failed)
+        for (const fs::path& candidate :
+             {own.parent_path() / program, own.parent_path().parent_path() / "libexec" / "trimray" / program})
+            if (fs::exists(candidate, failed))
+                return candidate.string();
+    const char* path = std::getenv("PATH");
+    std::istringstream folders(path ? path : "");
+    for (std::string folder; std::getline(folders, folder, ':');)
+        if (const fs::path candidate = fs::path(folder) / program;
+            !folder.empty() && access(candidate.c_str(), X_OK) == 0)
+            return candidate.string();
+    return Error{ErrorCode::UnsupportedFormat, program,
+                 fmt::format("not found beside {} nor in PATH; build all of trimray (the converter: "
+                             "-DTRIMRAY_PREPROCESS=ON, with OpenCASCADE) and install it there",
+                             own.empty() ? "trimray" : own.parent_path().string())};
+}
+
 int run_external(const ExternalCommand& command, const std::vector<std::string>& arguments)
 {
+    const Result<std::string> program = find_program(command.program);
+    if (!program.ok())
+        return report_error(program.error());
     std::vector<std::string> argv_strings = {command.program};
     argv_strings.insert(argv_strings.end(), arguments.begin(), arguments.end());
     std::vector<char*> argv;
     for (std::string& argument : argv_strings)
         argv.push_back(argument.data());
     argv.push_back(nullptr);
-
-    std::error_code failed;
-    const fs::path own = fs::read_symlink("/proc/self/exe", failed);
-    std::vector<fs::path> candidates;
-    if (!failed)
-        candidates = {own.parent_path() / command.program,
-                      own.parent_path().parent_path() / "libexec" / "trimray" / command.program};
-    for (const fs::path& candidate : candidates) {
-        if (!fs::exists(candidate, failed))
-            continue;
-        execv(candidate.c_str(), argv.data());
-        return report_error({ErrorCode::FileNotReadable, candidate.string(),
-                             fmt::format("cannot be run: {}; reinstall trimray", std::strerror(errno))});
-    }
-    execvp(command.program, argv.data());
-    const std::string beside = failed || own.empty() ? "trimray" : own.parent_path().string();
-    return report_error(
-        {ErrorCode::UnsupportedFormat, command.program,
-         fmt::format("not found beside {} nor in PATH; build all of trimray and install it there", beside)});
+    execv(program->c_str(), argv.data());
+    return report_error({ErrorCode::FileNotReadable, *program,
+                         fmt::format("cannot be run: {}; reinstall trimray", std::strerror(errno))});
 }
 
 } // namespace trimray

@@ -2,6 +2,8 @@
 // leaves its exit code in `exit_code` when it ran; what it prints follows the conventions of command_report.h.
 #pragma once
 
+#include "format/result.h"
+
 #include <string>
 #include <vector>
 
@@ -32,8 +34,10 @@ size_t words_of(const ExternalCommand& command, const std::vector<std::string>& 
 /// Lists those of one word, or those whose first word is `parent`, in the help of `app`.
 void register_externals(CLI::App& app, const std::string& parent = "");
 
-/// Replaces this process by the command's program: beside our own binary, then ../libexec/trimray, then PATH.
-/// Returns only when it cannot, with the exit code.
+/// The file of one of our programs: beside our own binary, in ../libexec/trimray, or in PATH. Fails: UnsupportedFormat.
+Result<std::string> find_program(const std::string& program);
+
+/// Replaces this process by the command's program. Returns only when it cannot, with the exit code.
 int run_external(const ExternalCommand& command, const std::vector<std::string>& arguments);
 
 } // namespace trimray

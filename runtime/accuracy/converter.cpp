@@ -1,0 +1,141 @@
+#include "runtime/accuracy/converter.h"
+
+#include "runtime/commands.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
+#include <fcntl.h>
+#include <filesystem>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <system_error>
+#include <unistd.h>
+#include <utility>
+
+namespace trimray {
+namespace {
+namespace fs = std::filesystem;
+
+/// A pipe whose ends close with it.
+struct Pipe {
+    std::array<int, 2> ends{-1, -1};
+    ~Pipe()
+    {
+        close_end(0);
+        close_end(1);
+    }
+    void close_end(size_t i)
+    {
+        if (ends[i] >= 0)
+            ::close(ends[i]);
+        ends[i] = -1;
+    }
+};
+
+Error cannot_run(const std::string& program, int code)
+{
+    return Error{ErrorCode::Internal, program, fmt::format("cannot be run: {}", std::strerror(code))};
+}
+
+/// What a program prints on stdout, and its exit code.
+Result<std::pair<std::string, int>> output_of(const std::string& program, std::vector<std::string> arguments)
+{
+    arguments.insert(arguments.begin(), program);
+    std::vector<char*> argv;
+    for (std::string& argument : arguments)
+        argv.push_back(argument.data());
+    argv.push_back(nullptr);
+    Pipe pipe;
+    if (::pipe2(pipe.ends.data(), O_CLOEXEC) != 0)
+        return cannot_run(program, errno);
+    posix_spawn_file_actions_t actions;
+    posix_spawn_file_actions_init(&actions);
+    posix_spawn_file_actions_adddup2(&actions, pipe.ends[1], STDOUT_FILENO);
+    pid_t child = -1;
+    const int failed = posix_spawn(&child, program.c_str(), &actions, nullptr, argv.data(), environ);
+    posix_spawn_file_actions_destroy(&actions);
+    if (failed != 0)
+        return cannot_run(program, failed);
+    pipe.close_end(1);
+    std::string text;
+    std::array<char, 65536> buffer;
+    for (;;) {
+        const ssize_t count = ::read(pipe.ends[0], buffer.data(), buffer.size());
+        if (count > 0)
+            text.append(buffer.data(), static_cast<size_t>(count));
+        else if (count == 0 || errno != EINTR)
+            break;
+    }
+    int status = 0;
+    while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
+    }
+    return std::pair{std::move(text), WIFEXITED(status) ? WEXITSTATUS(status) : int{kExitInternal}};
+}
+
+ErrorCode code_of(int exit_code)
+{
+    switch (exit_code) {
+    case kExitUsage:
+        return ErrorCode::Usage;
+    case kExitIo:
+        return ErrorCode::FileNotReadable;
+    case kExitInvalid:
+        return ErrorCode::InvalidCad;
+    case kExitUnsupported:
+        return ErrorCode::UnsupportedFormat;
+    default:
+        return ErrorCode::Internal;
+    }
+}
+
+} // namespace
+
+bool is_cad_file(const std::string& path)
+{
+    return fs::path(path).extension() != ".tray";
+}
+
+Result<ScratchFolder> ScratchFolder::make()
+{
+    std::error_code failed;
+    const fs::path parent = fs::temp_directory_path(failed);
+    std::string name = (failed ? fs::path("/tmp") : parent) / "trimray-accuracy-XXXXXX";
+    if (::mkdtemp(name.data()) == nullptr)
+        return Error{ErrorCode::FileNotWritable, name,
+                     fmt::format("cannot be made: {}; set TMPDIR to a folder that exists", std::strerror(errno))};
+    return ScratchFolder(std::move(name));
+}
+
+ScratchFolder::ScratchFolder(ScratchFolder&& other) noexcept : path_(std::exchange(other.path_, {})) {}
+
+ScratchFolder::~ScratchFolder()
+{
+    std::error_code ignored;
+    if (!path_.empty())
+        fs::remove_all(path_, ignored);
+}
+
+Result<Json> run_converter(const std::string& model, const std::string& output, const std::vector<std::string>& options)
+{
+    const Result<std::string> program = find_program("trimray-pack");
+    if (!program.ok())
+        return program.error();
+    std::vector<std::string> arguments{model, "-o", output, "--json"};
+    arguments.insert(arguments.end(), options.begin(), options.end());
+    const auto ran = output_of(*program, arguments);
+    if (!ran.ok())
+        return ran.error();
+    const auto& [text, exit_code] = *ran;
+    if (exit_code != kExitOk && exit_code != kExitPartial)
+        return Error{code_of(exit_code), model, "was not converted; the reason is above"};
+    Json report = Json::parse(text, nullptr, false);
+    if (report.is_discarded())
+        return Error{ErrorCode::Internal, *program, "its report is no JSON"};
+    return report;
+}
+
+} // namespace trimray

@@ -1,0 +1,37 @@
+// CAD files as packs and meshes, made by trimray-pack in processes of their own.
+#pragma once
+
+#include "format/result.h"
+#include "runtime/command_json.h"
+
+#include <string>
+#include <vector>
+
+namespace trimray {
+
+/// Whether the file is a CAD model by its name: anything but a pack (.tray).
+bool is_cad_file(const std::string& path);
+
+/// A folder for files of this process alone, removed with all that is in it when this object goes.
+class ScratchFolder {
+public:
+    /// Fails: FileNotWritable.
+    static Result<ScratchFolder> make();
+    ScratchFolder(ScratchFolder&& other) noexcept;
+    ScratchFolder& operator=(ScratchFolder&&) = delete;
+    ~ScratchFolder();
+
+    std::string file(const std::string& name) const { return path_ + '/' + name; }
+
+private:
+    explicit ScratchFolder(std::string path) : path_(std::move(path)) {}
+    std::string path_; // empty: moved from
+};
+
+/// Runs `trimray-pack MODEL -o OUTPUT OPTIONS --json` and gives what it reports: a model of which some faces were
+/// dropped too. Its messages go to our stderr. Fails: UnsupportedFormat (there is no such program, or no such format);
+/// as its exit code says.
+Result<Json> run_converter(const std::string& model, const std::string& output,
+                           const std::vector<std::string>& options);
+
+} // namespace trimray
