@@ -840,6 +840,34 @@ class Bench(CliTest):
             self.assertEqual(rows[0]["contender"], "default")
             self.assertEqual(float(rows[1]["leaf_visits"]), model["views"][0]["points"][1]["leaf_visits"])
 
+    def test_accuracy_has_peers_where_it_has_the_cad_file(self):
+        if not OPTIONS.has_pack:
+            self.skipTest("no converter")
+        with tempfile.TemporaryDirectory() as root:
+            report = self.json_of("bench", "accuracy", MODEL, PACK, "-o", root, "--quick", "--size", "64x48", "--views", 1,
+                                  "--rounds", 1, "--json")
+        of_model, of_pack = report["models"]
+        self.assertEqual(of_model["notes"], [])
+        self.assertIn("CAD file", of_pack["notes"][0])
+        self.assertNotIn("peers", {row["dial"] for row in of_pack["contenders"]})
+        peers = [(row, point) for row, point in zip(of_model["contenders"], of_model["views"][0]["points"])
+                 if row["dial"] == "peers"]
+        self.assertEqual([row["name"].split(",")[0].split(":")[0] for row, _ in peers],
+                         ["the paper's shape", "the same", "the same"] + 3 * ["triangles"])
+        default = of_model["contenders"][0]
+        for row in [default] + [row for row, _ in peers]:
+            self.assertGreater(row["make_seconds"], 0)
+            self.assertGreater(row["file_bytes"], 0)
+        self.assertGreater(default["first_picture_ms"], 0)
+        (one_ray, alone), (_, wide) = peers[:2]
+        self.assertIn("one ray", one_ray["name"])
+        self.assertEqual(alone["wrong_per_million"], wide["wrong_per_million"], "the same pictures, but for rounding")
+        triangles = [row["triangles"] for row, _ in peers[3:]]
+        self.assertEqual(triangles, sorted(set(triangles)))
+        depths = [point["depth_px_mean"] for _, point in peers[3:]]
+        self.assertEqual(depths, sorted(depths, reverse=True), "finer meshes lie nearer")
+        self.assertLess(of_model["views"][0]["points"][0]["depth_px_mean"], depths[-1])
+
     def test_accuracy_refuses_what_it_cannot_do(self):
         with tempfile.TemporaryDirectory() as root:
             missing = Path(root) / "missing.tray"

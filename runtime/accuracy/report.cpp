@@ -97,12 +97,24 @@ Json to_json(const Camera& camera)
     return {{"eye", camera.eye}, {"target", camera.target}, {"up", camera.up}, {"fov", camera.fov_deg}};
 }
 
+Json to_json(const ReportedContender& contender)
+{
+    Json object{{"dial", contender.dial}, {"name", contender.name}};
+    if (const auto& made = contender.preparation) {
+        object["make_seconds"] = made->make_seconds;
+        object["file_bytes"] = made->file_bytes;
+        object["first_picture_ms"] = made->first_picture_ms > 0 ? Json(made->first_picture_ms) : Json();
+        object["triangles"] = made->triangles ? Json(*made->triangles) : Json();
+    }
+    return object;
+}
+
 Json to_json(const ModelReport& model, const AccuracyOptions& options)
 {
     Json object{{"model", model.name}, {"faces", model.faces}, {"instances", model.instances}, {"notes", model.notes}};
     object["contenders"] = Json::array();
     for (const ReportedContender& contender : model.contenders)
-        object["contenders"].push_back({{"dial", contender.dial}, {"name", contender.name}});
+        object["contenders"].push_back(to_json(contender));
     object["views"] = Json::array();
     for (const AccuracyView& view : model.views) {
         Json of_view{{"view", view.name}, {"camera", to_json(view.camera)}, {"points", Json::array()}};

@@ -1,10 +1,11 @@
 // What an accuracy report holds, and its forms.
 #pragma once
 
-#include "runtime/accuracy/measure.h"
+#include "runtime/accuracy/peers.h"
 #include "runtime/command_json.h"
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -13,6 +14,7 @@ namespace trimray {
 /// A contender as the report names it.
 struct ReportedContender {
     std::string dial, name;
+    std::optional<Preparation> preparation; // of the default, where it was made from a CAD file, and of peers
 };
 
 struct ModelReport {

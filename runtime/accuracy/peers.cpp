@@ -1,0 +1,212 @@
+#include "runtime/accuracy/peers.h"
+
+#include "format/mesh_file.h"
+#include "runtime/accuracy/mesh_tracer.h"
+#include "runtime/accuracy/one_ray_tracer.h"
+#include "runtime/bench_view.h"
+#include "runtime/cpu_view.h"
+#include "runtime/derived_scene.h"
+#include "runtime/median.h"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <filesystem>
+#include <system_error>
+#include <utility>
+
+namespace trimray {
+namespace {
+namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
+
+constexpr const char* kDial = "peers";
+
+uint64_t size_of_file(const std::string& path)
+{
+    std::error_code failed;
+    const uintmax_t bytes = fs::file_size(path, failed);
+    return failed ? 0 : bytes;
+}
+
+/// Of a report of trimray-pack: all phases but the previews, which no mesh has.
+double seconds_of(const Json& report)
+{
+    double sum = 0;
+    for (const auto& [phase, seconds] : report["seconds"].items())
+        if (phase != "total" && phase != "preview")
+            sum += seconds.get<double>();
+    return sum;
+}
+
+/// Milliseconds from opening a file to a picture of it, from where `camera` is.
+Result<double> first_picture_ms(const std::function<Result<std::unique_ptr<Tracer>>()>& open, const Camera& camera,
+                                const AccuracyOptions& options, ClosestPolicy closest)
+{
+    constexpr int kTimed = 3;
+    std::vector<double> ms;
+    for (int i = 0; i <= kTimed; ++i) { // the first brings the file into the cache
+        const Clock::time_point start = Clock::now();
+        Result<std::unique_ptr<Tracer>> tracer = open();
+        if (!tracer.ok())
+            return tracer.error();
+        RenderOptions render;
+        render.width = options.width;
+        render.height = options.height;
+        render.camera = camera;
+        render.closest = closest;
+        RenderStats stats;
+        if (const Result<Frame> frame = (*tracer)->render(render, stats); !frame.ok())
+            return frame.error();
+        if (i > 0)
+            ms.push_back(std::chrono::duration<double, std::milli>(Clock::now() - start).count());
+    }
+    return median(std::move(ms));
+}
+
+Result<std::unique_ptr<Tracer>> open_pack(const std::string& path)
+{
+    const Result<std::shared_ptr<const Scene>> scene = load_scene(path);
+    if (!scene.ok())
+        return scene.error();
+    return make_cpu_tracer(*scene);
+}
+
+Result<std::unique_ptr<Tracer>> open_mesh(const std::string& path)
+{
+    Result<TriangleMesh> mesh = read_mesh(path);
+    if (!mesh.ok())
+        return mesh.error();
+    return make_mesh_tracer(std::move(*mesh));
+}
+
+/// The paper's own frame, its first.
+void ask_as_the_paper(RenderOptions& render)
+{
+    render.closest = ClosestPolicy::Stochastic;
+    render.trim = TrimMode::Kd;
+}
+
+/// What is asked of a mesh: nothing, for it has neither trims nor leaves.
+void ask_nothing(RenderOptions&) {}
+
+class PeerMaker {
+public:
+    PeerMaker(const std::string& model, const ScratchFolder& scratch, const Camera& camera,
+              const AccuracyOptions& options)
+        : model_(model), scratch_(scratch), camera_(camera), options_(options)
+    {
+    }
+
+    void add_paper(Peers& peers) const
+    {
+        const std::string pack = scratch_.file("paper.tray");
+        const Result<Json> report = run_converter(
+            model_, pack, {"--no-previews", "--surfaces", "bezier", "--leaf-budget", "1", "--trim-memory", "0"});
+        const auto scene = report.ok() ? load_scene(pack) : Result<std::shared_ptr<const Scene>>(report.error());
+        if (!scene.ok()) {
+            peers.notes.push_back("the paper's shape of tracer: " + scene.error().detail);
+            return;
+        }
+        const Preparation preparation{seconds_of(*report), size_of_file(pack), {}, {}};
+        const uint64_t bytes = memory_bytes((*scene)->pack.image).total();
+        add(peers,
+            {kDial, "the paper's shape: Bézier, one leaf a patch, kd-trees, one ray", make_one_ray_tracer(*scene),
+             ask_as_the_paper, bytes},
+            preparation);
+        if (Result<std::unique_ptr<Tracer>> wide = make_cpu_tracer(*scene); wide.ok())
+            add(peers, {kDial, "the same, 16 rays wide", std::move(*wide), ask_as_the_paper, bytes}, preparation);
+        const Result<KdTrims>& kd = (*scene)->prepared->kd_trims();
+        if (!kd.ok())
+            return;
+        const auto textured = with_textures(**scene, {TrimSource::Mask, TrimLayout::Square}, double(kd->size_bytes()));
+        if (Result<std::unique_ptr<Tracer>> wide = make_cpu_tracer(textured); wide.ok())
+            add(peers,
+                {kDial, "the same, 16 rays wide, the paper's textures (100 %)", std::move(*wide),
+                 [](RenderOptions& render) {
+                     ask_as_the_paper(render);
+                     render.trim = TrimMode::Sdf;
+                 },
+                 memory_bytes(textured->pack.image).total()},
+                preparation);
+    }
+
+    void add_mesh(double deflection, Peers& peers) const
+    {
+        const std::string name = fmt::format("triangles, deflection {:g}", deflection);
+        const std::string file = scratch_.file(fmt::format("{:g}.trimesh", deflection));
+        const Result<Json> report = run_converter(model_, file, {"--mesh", fmt::format("{:g}", deflection)});
+        const auto opened = report.ok() ? open_mesh(file) : Result<std::unique_ptr<Tracer>>(report.error());
+        const Result<double> first =
+            opened.ok() ? first_picture_ms([&] { return open_mesh(file); }, camera_, options_, ClosestPolicy::Certified)
+                        : Result<double>(opened.error());
+        if (!first.ok()) {
+            peers.notes.push_back(name + ": " + first.error().detail);
+            return;
+        }
+        Result<std::unique_ptr<Tracer>> tracer = open_mesh(file);
+        const Preparation preparation{seconds_of(*report), size_of_file(file), *first,
+                                      (*report)["triangles"].get<uint64_t>()};
+        std::error_code ignored;
+        fs::remove(file, ignored); // fine meshes are large
+        if (tracer.ok())
+            add(peers, {kDial, name, std::move(*tracer), ask_nothing, 0}, preparation);
+    }
+
+private:
+    static void add(Peers& peers, Contender contender, const Preparation& preparation)
+    {
+        peers.contenders.push_back(std::move(contender));
+        peers.preparations.push_back(preparation);
+    }
+
+    const std::string& model_;
+    const ScratchFolder& scratch_;
+    const Camera& camera_;
+    const AccuracyOptions& options_;
+};
+
+} // namespace
+
+std::vector<double> mesh_deflections(bool quick)
+{
+    return quick ? std::vector{1e-2, 1e-3, 1e-4} : std::vector{1e-2, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5};
+}
+
+Result<Preparation> make_own_pack(const std::string& model, const std::string& pack, const AccuracyOptions& options)
+{
+    const Result<Json> report = run_converter(model, pack, {"--no-previews"});
+    if (!report.ok())
+        return report.error();
+    const Result<std::shared_ptr<const Scene>> scene = load_scene(pack);
+    if (!scene.ok())
+        return scene.error();
+    const Result<Camera> camera = bench_view("iso", *scene, options.width, options.height, options.magnification);
+    if (!camera.ok())
+        return camera.error();
+    const Result<double> first =
+        first_picture_ms([&] { return open_pack(pack); }, *camera, options, ClosestPolicy::Certified);
+    if (!first.ok())
+        return first.error();
+    return Preparation{seconds_of(*report), size_of_file(pack), *first, {}};
+}
+
+Result<Peers> make_peers(const std::string& model, const std::shared_ptr<const Scene>& scene,
+                         const ScratchFolder& scratch, const AccuracyOptions& options,
+                         const std::function<void(const std::string&)>& progress)
+{
+    const Result<Camera> camera = bench_view("iso", scene, options.width, options.height, options.magnification);
+    if (!camera.ok())
+        return camera.error();
+    const PeerMaker maker(model, scratch, *camera, options);
+    Peers peers;
+    progress("the paper's shape of tracer");
+    maker.add_paper(peers);
+    for (const double deflection : mesh_deflections(options.quick)) {
+        progress(fmt::format("triangles, deflection {:g}", deflection));
+        maker.add_mesh(deflection, peers);
+    }
+    return peers;
+}
+
+} // namespace trimray
