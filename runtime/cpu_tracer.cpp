@@ -7,24 +7,18 @@
 #include "runtime/materials.h"
 #include "runtime/section_view.h"
 #include "runtime/surface_map.h"
-#include "runtime/thread_clock.h"
+#include "runtime/timed_frames.h"
 #include "runtime/trace_one.h"
 #include "runtime/tracer.h"
 #include "runtime/trim_mode.h"
 
 #include <algorithm>
-#include <chrono>
-#include <functional>
 #include <limits>
 #include <optional>
 #include <utility>
 
 #include <fmt/format.h>
-#include <tbb/blocked_range2d.h>
 #include <tbb/enumerable_thread_specific.h>
-#include <tbb/info.h>
-#include <tbb/parallel_for.h>
-#include <tbb/task_arena.h>
 
 namespace trimray {
 namespace {
@@ -77,8 +71,6 @@ public:
         stats.trim = *trim;
         stats.kd_bytes = *trim == TrimMode::Kd ? cpu_scene_->kd_trims()->size_bytes() : 0;
         stats.border_bytes = asks_borders ? border_cells_->size_bytes() : 0;
-        stats.frame_ms.clear();
-        stats.frame_cpu_ms.clear();
         stats.trim_queries.clear();
         if (*trim == TrimMode::Reference && reference_ == nullptr)
             reference_ = std::make_unique<const TrimReference>(scene_->pack.image);
@@ -86,22 +78,12 @@ public:
         resize(frame, options.width, options.height);
         if (measures(options.look.map.map))
             frame.map_value.resize(frame.depth_mm.size());
-        const int threads =
-            options.threads > 0 ? int(std::min(options.threads, 1024u)) : tbb::info::default_concurrency();
-        tbb::task_arena arena(threads);
         kept_ = keeps_hits(options) ? no_hits(options.width, options.height) : KeptHits{};
-        for (uint32_t i = 0; i < std::max(options.frames, 1u); ++i) {
-            const auto start = std::chrono::steady_clock::now();
-            const double cpu_start = thread_cpu_seconds();
-            const WorkCounts work = render_once(options, *materials, stats.trim, i, threads, arena, frame);
-            if (i == 0)
-                stats.work = work;
-            const std::chrono::duration<double, std::milli> spent = std::chrono::steady_clock::now() - start;
-            stats.frame_ms.push_back(spent.count());
-            if (threads == 1)
-                stats.frame_cpu_ms.push_back(1e3 * (thread_cpu_seconds() - cpu_start));
+        time_frames(options, stats, [&](uint32_t number, const RunEach& run_each) {
+            const WorkCounts work = render_once(options, *materials, stats.trim, number, run_each, frame);
             take_queries(stats.trim_queries);
-        }
+            return work;
+        });
         stats.buffer_bytes = stats.kd_bytes + stats.border_bytes + (has_effects(options) ? edge_map_.size_bytes() : 0) +
                              (asks_free_rays ? to_part_.size() * sizeof(WorldToPart) : 0) +
                              (options.shade && has_materials(options.look) ? materials->size_bytes() : 0) +
@@ -111,7 +93,7 @@ public:
 
 private:
     WorkCounts render_once(const RenderOptions& options, const MaterialTable& materials, TrimMode trim,
-                           uint32_t frame_number, int threads, tbb::task_arena& arena, Frame& frame)
+                           uint32_t frame_number, const RunEach& run_each, Frame& frame)
     {
         const CameraRays rays = camera_rays(options.camera, options.width, options.height);
         View view = make_view(cpu_scene_->image, rays, options.width, options.height);
@@ -172,13 +154,6 @@ private:
             const uint32_t x = i % columns * kBlockSide, y = i / columns * kBlockSide;
             const Block block{x, y, std::min(x + kBlockSide, options.width), std::min(y + kBlockSide, options.height)};
             trace_block_(job, block, scratch_.local(), frame, counts.local());
-        };
-        const auto run_each = [&](uint32_t count, const std::function<void(uint32_t)>& body) {
-            if (threads == 1)
-                for (uint32_t i = 0; i < count; ++i)
-                    body(i);
-            else
-                arena.execute([&] { tbb::parallel_for(0u, count, body); });
         };
         run_each(columns * rows, trace_one);
         if (effects)

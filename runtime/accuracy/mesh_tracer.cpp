@@ -2,10 +2,10 @@
 
 #include "format/pack_image.h"
 #include "runtime/accuracy/mesh_lanes.h"
-#include "runtime/accuracy/timed_frames.h"
 #include "runtime/effect_plan.h"
 #include "runtime/frame_effects.h"
 #include "runtime/frame_size.h"
+#include "runtime/timed_frames.h"
 
 #include <algorithm>
 #include <array>
@@ -159,7 +159,7 @@ public:
         stats.device = name_;
         Frame frame;
         resize(frame, options.width, options.height);
-        time_frames(options, stats, [&](const RunEach& run_each) { stats.work = trace(options, run_each, frame); });
+        time_frames(options, stats, [&](uint32_t, const RunEach& run_each) { return trace(options, run_each, frame); });
         stats.buffer_bytes = uint64_t(embree_bytes_.load()) + bytes_of(mesh_.positions) + bytes_of(mesh_.normals) +
                              bytes_of(mesh_.triangles) + bytes_of(mesh_.triangle_face) + bytes_of(mesh_.faces) +
                              bytes_of(mesh_.instances) + bytes_of(mesh_.parts);

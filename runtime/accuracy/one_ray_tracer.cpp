@@ -8,16 +8,12 @@
 #include "runtime/frame_effects.h"
 #include "runtime/frame_size.h"
 #include "runtime/stochastic_frames.h"
-#include "runtime/thread_clock.h"
+#include "runtime/timed_frames.h"
 
 #include <algorithm>
-#include <chrono>
 #include <utility>
 
 #include <tbb/enumerable_thread_specific.h>
-#include <tbb/info.h>
-#include <tbb/parallel_for.h>
-#include <tbb/task_arena.h>
 
 namespace trimray {
 namespace {
@@ -56,20 +52,9 @@ public:
         resize(frame, options.width, options.height);
         kept_.assign(keeps_hits(options) ? frame.depth_mm.size() : 0, one_ray::NearestHit{});
         stats.buffer_bytes = stats.kd_bytes + opened_.size_bytes() + kept_.size() * sizeof(one_ray::NearestHit);
-        const int threads =
-            options.threads > 0 ? int(std::min(options.threads, 1024u)) : tbb::info::default_concurrency();
-        tbb::task_arena arena(threads);
-        for (uint32_t i = 0; i < std::max(options.frames, 1u); ++i) {
-            const auto start = std::chrono::steady_clock::now();
-            const double cpu_start = thread_cpu_seconds();
-            const WorkCounts work = render_once(options, *kd, i, threads, arena, frame);
-            if (i == 0)
-                stats.work = work;
-            const std::chrono::duration<double, std::milli> spent = std::chrono::steady_clock::now() - start;
-            stats.frame_ms.push_back(spent.count());
-            if (threads == 1)
-                stats.frame_cpu_ms.push_back(1e3 * (thread_cpu_seconds() - cpu_start));
-        }
+        time_frames(options, stats, [&](uint32_t number, const RunEach& run_each) {
+            return render_once(options, *kd, number, run_each, frame);
+        });
         return frame;
     }
 
@@ -91,8 +76,8 @@ private:
         return Done{};
     }
 
-    WorkCounts render_once(const RenderOptions& options, const KdTrims& kd, uint32_t frame_number, int threads,
-                           tbb::task_arena& arena, Frame& frame)
+    WorkCounts render_once(const RenderOptions& options, const KdTrims& kd, uint32_t frame_number,
+                           const RunEach& run_each, Frame& frame)
     {
         const PackImage& image = cpu_scene_->image;
         View view =
@@ -118,14 +103,9 @@ private:
         }
         const uint32_t columns = (options.width + kTileSide - 1) / kTileSide,
                        rows = (options.height + kTileSide - 1) / kTileSide;
-        const auto trace_one = [&](uint32_t i) {
+        run_each(columns * rows, [&](uint32_t i) {
             trace_tile(options, job, i % columns * kTileSide, i / columns * kTileSide, frame);
-        };
-        if (threads == 1)
-            for (uint32_t i = 0; i < columns * rows; ++i)
-                trace_one(i);
-        else
-            arena.execute([&] { tbb::parallel_for(0u, columns * rows, trace_one); });
+        });
         WorkCounts sum;
         for (const Scratch& scratch : scratch_)
             sum += scratch.work;

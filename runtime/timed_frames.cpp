@@ -1,14 +1,9 @@
-// The frames of a picture, timed as the CPU tracer times its own.
-#pragma once
+#include "runtime/timed_frames.h"
 
-#include "runtime/frame_effects.h"
 #include "runtime/thread_clock.h"
-#include "runtime/tracer.h"
 
 #include <algorithm>
 #include <chrono>
-#include <cstdint>
-#include <functional>
 
 #include <tbb/info.h>
 #include <tbb/parallel_for.h>
@@ -16,14 +11,12 @@
 
 namespace trimray {
 
-/// Calls trace(run_each) once a frame; run_each spreads its work over the threads that `options` asks for. Keeps each
-/// frame's time in `stats`, and its processor time where that is one thread's.
-inline void time_frames(const RenderOptions& options, RenderStats& stats,
-                        const std::function<void(const RunEach& run_each)>& trace)
+void time_frames(const RenderOptions& options, RenderStats& stats,
+                 const std::function<WorkCounts(uint32_t number, const RunEach& run_each)>& trace)
 {
     const int threads = options.threads > 0 ? int(std::min(options.threads, 1024u)) : tbb::info::default_concurrency();
     tbb::task_arena arena(threads);
-    const auto run_each = [&](uint32_t count, const std::function<void(uint32_t)>& body) {
+    const RunEach run_each = [&](uint32_t count, const std::function<void(uint32_t)>& body) {
         if (threads == 1)
             for (uint32_t i = 0; i < count; ++i)
                 body(i);
@@ -35,11 +28,13 @@ inline void time_frames(const RenderOptions& options, RenderStats& stats,
     for (uint32_t i = 0; i < std::max(options.frames, 1u); ++i) {
         const auto start = std::chrono::steady_clock::now();
         const double cpu_start = thread_cpu_seconds();
-        trace(run_each);
+        const WorkCounts work = trace(i, run_each);
         const std::chrono::duration<double, std::milli> spent = std::chrono::steady_clock::now() - start;
         stats.frame_ms.push_back(spent.count());
         if (threads == 1)
             stats.frame_cpu_ms.push_back(1e3 * (thread_cpu_seconds() - cpu_start));
+        if (i == 0)
+            stats.work = work;
     }
 }
 
