@@ -29,22 +29,6 @@ std::shared_ptr<const Scene> scene_of(const std::shared_ptr<const Scene>& scene,
     return scene;
 }
 
-uint64_t bytes_read(const Scene& scene, TrimMode trim)
-{
-    const MemoryBytes bytes = memory_bytes(scene.pack.image);
-    const uint64_t surfaces = bytes.geometry + bytes.bvh + scene.prepared->bytes();
-    switch (trim) {
-    case TrimMode::Kd: // RenderStats counts the trees
-        return surfaces;
-    case TrimMode::Sdf:
-        return surfaces + bytes.trim_sdf;
-    case TrimMode::Hybrid:
-        return surfaces + bytes.trim_exact + bytes.trim_sdf;
-    default:
-        return surfaces + bytes.trim_exact;
-    }
-}
-
 /// Of one picture, its frames together.
 double picture_ms(const RenderStats& stats)
 {
@@ -69,6 +53,22 @@ Result<Made> make_picture(const Contender& contender, RenderOptions render)
 }
 
 } // namespace
+
+uint64_t bytes_read(const Scene& scene, TrimMode trim)
+{
+    const MemoryBytes bytes = memory_bytes(scene.pack.image);
+    const uint64_t surfaces = bytes.geometry + bytes.bvh + scene.prepared->bytes();
+    switch (trim) {
+    case TrimMode::Kd: // RenderStats counts the trees
+        return surfaces;
+    case TrimMode::Sdf:
+        return surfaces + bytes.trim_sdf;
+    case TrimMode::Hybrid:
+        return surfaces + bytes.trim_exact + bytes.trim_sdf;
+    default:
+        return surfaces + bytes.trim_exact;
+    }
+}
 
 Result<std::vector<Contender>> make_contenders(const std::shared_ptr<const Scene>& scene,
                                                const AccuracyOptions& options)

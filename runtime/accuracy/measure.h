@@ -50,6 +50,9 @@ struct AccuracyOptions {
     bool quick = false;
 };
 
+/// Bytes of a scene's arrays that our tracer reads with these trims, but for those that RenderStats counts.
+uint64_t bytes_read(const Scene& scene, TrimMode trim);
+
 /// The pack's own contenders, the default first: one for each of accuracy_settings(). Those that cut leaves or make
 /// textures have copies of the pack. Fails: as make_tracer, derive_kd.
 Result<std::vector<Contender>> make_contenders(const std::shared_ptr<const Scene>& scene,

@@ -41,7 +41,7 @@ double seconds_of(const Json& report)
 
 /// Milliseconds from opening a file to a picture of it, from where `camera` is.
 Result<double> first_picture_ms(const std::function<Result<std::unique_ptr<Tracer>>()>& open, const Camera& camera,
-                                const AccuracyOptions& options, ClosestPolicy closest)
+                                const AccuracyOptions& options)
 {
     constexpr int kTimed = 3;
     std::vector<double> ms;
@@ -54,7 +54,6 @@ Result<double> first_picture_ms(const std::function<Result<std::unique_ptr<Trace
         render.width = options.width;
         render.height = options.height;
         render.camera = camera;
-        render.closest = closest;
         RenderStats stats;
         if (const Result<Frame> frame = (*tracer)->render(render, stats); !frame.ok())
             return frame.error();
@@ -109,7 +108,7 @@ public:
             return;
         }
         const Preparation preparation{seconds_of(*report), size_of_file(pack), {}, {}};
-        const uint64_t bytes = memory_bytes((*scene)->pack.image).total();
+        const uint64_t bytes = bytes_read(**scene, TrimMode::Kd);
         add(peers,
             {kDial, "the paper's shape: Bézier, one leaf a patch, kd-trees, one ray", make_one_ray_tracer(*scene),
              ask_as_the_paper, bytes},
@@ -127,7 +126,7 @@ public:
                      ask_as_the_paper(render);
                      render.trim = TrimMode::Sdf;
                  },
-                 memory_bytes(textured->pack.image).total()},
+                 bytes_read(*textured, TrimMode::Sdf)},
                 preparation);
     }
 
@@ -137,9 +136,8 @@ public:
         const std::string file = scratch_.file(fmt::format("{:g}.trimesh", deflection));
         const Result<Json> report = run_converter(model_, file, {"--mesh", fmt::format("{:g}", deflection)});
         const auto opened = report.ok() ? open_mesh(file) : Result<std::unique_ptr<Tracer>>(report.error());
-        const Result<double> first =
-            opened.ok() ? first_picture_ms([&] { return open_mesh(file); }, camera_, options_, ClosestPolicy::Certified)
-                        : Result<double>(opened.error());
+        const Result<double> first = opened.ok() ? first_picture_ms([&] { return open_mesh(file); }, camera_, options_)
+                                                 : Result<double>(opened.error());
         if (!first.ok()) {
             peers.notes.push_back(name + ": " + first.error().detail);
             return;
@@ -184,8 +182,7 @@ Result<Preparation> make_own_pack(const std::string& model, const std::string& p
     const Result<Camera> camera = bench_view("iso", *scene, options.width, options.height, options.magnification);
     if (!camera.ok())
         return camera.error();
-    const Result<double> first =
-        first_picture_ms([&] { return open_pack(pack); }, *camera, options, ClosestPolicy::Certified);
+    const Result<double> first = first_picture_ms([&] { return open_pack(pack); }, *camera, options);
     if (!first.ok())
         return first.error();
     return Preparation{seconds_of(*report), size_of_file(pack), *first, {}};
