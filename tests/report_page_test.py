@@ -59,7 +59,8 @@ class Page(unittest.TestCase):
         cls.report = json.loads((folder / "report.json").read_text())
         asked = folder / "asked.html"
         asked.write_text(cls.page.replace("<head>", "<head>" + CATCH).replace("</body>", ASK + "</body>"))
-        dumped = subprocess.run([CHROMIUM, "--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={folder}/profile",
+        dumped = subprocess.run([CHROMIUM, "--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage",
+                                 f"--user-data-dir={folder}/profile",
                                  "--window-size=1200,2000", "--dump-dom", asked.as_uri()],
                                 capture_output=True, text=True, check=True, timeout=120).stdout
         cls.found = json.loads(re.search(r'id="found">(.*?)</script>', dumped, re.S)[1])
