@@ -868,6 +868,19 @@ class Bench(CliTest):
         self.assertEqual(depths, sorted(depths, reverse=True), "finer meshes lie nearer")
         self.assertLess(of_model["views"][0]["points"][0]["depth_px_mean"], depths[-1])
 
+    def test_accuracy_goes_on_after_a_model_that_fails(self):
+        with tempfile.TemporaryDirectory() as root:
+            missing = Path(root) / "missing.tray"
+            done = run("bench", "accuracy", missing, PACK, "-o", root, "--quick", "--size", "32x24", "--views", 1, "--rounds",
+                       1, "--json")
+            self.assertEqual(done.returncode, 2)
+            self.assertIn("missing.tray", done.stderr)
+            self.assertEqual([model["model"] for model in json.loads(done.stdout)["models"]], [PACK.name])
+            if OPTIONS.has_pack:
+                broken = Path(root) / "broken.step"
+                broken.write_text("ISO-10303-21;\nHEADER;\n")
+                self.fails(3, "bench", "accuracy", broken, "-o", root, says=["broken.step", "was not converted: trimray-pack"])
+
     def test_accuracy_refuses_what_it_cannot_do(self):
         with tempfile.TemporaryDirectory() as root:
             missing = Path(root) / "missing.tray"

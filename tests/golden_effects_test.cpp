@@ -19,17 +19,7 @@ namespace {
 /// The model's middle from where the view iso is, through another lens.
 RenderOptions framed(const Scene& scene, double fov_deg)
 {
-    const PackImage& image = scene.pack.image;
-    RenderOptions options;
-    options.width = 240;
-    options.height = 150;
-    const auto reach = [&](const std::array<double, 3>& direction) {
-        double sum = 0;
-        for (size_t i = 0; i < 3; ++i)
-            sum += std::max(direction[i] * image.bounds_lo_mm[i], direction[i] * image.bounds_hi_mm[i]);
-        return sum;
-    };
-    EXPECT_TRUE(standard_view("iso", reach, double(options.width) / options.height, 35, options.camera));
+    RenderOptions options = from_iso(scene.pack.image, 240, 150);
     options.camera.fov_deg = fov_deg;
     return options;
 }

@@ -380,17 +380,7 @@ TwoPictures pictures_of(const std::string& model_name, double deflection)
         ADD_FAILURE() << model_name;
         return {};
     }
-    RenderOptions options;
-    options.width = 320;
-    options.height = 200;
-    const auto reach = [&](const std::array<double, 3>& direction) {
-        double sum = 0;
-        for (size_t i = 0; i < 3; ++i)
-            sum += std::max(direction[i] * scene->pack.image.bounds_lo_mm[i],
-                            direction[i] * scene->pack.image.bounds_hi_mm[i]);
-        return sum;
-    };
-    EXPECT_TRUE(standard_view("iso", reach, 1.6, 35, options.camera));
+    const RenderOptions options = from_iso(scene->pack.image, 320, 200);
     return {picture(*tracer, options), traced(std::move(*mesh), options)};
 }
 

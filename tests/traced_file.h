@@ -5,6 +5,7 @@
 #include "format/pack_writer.h"
 #include "preprocess/build_pack.h"
 #include "preprocess/cad_import.h"
+#include "runtime/camera.h"
 #include "tests/against_reference.h"
 #include "tests/compare_frames.h"
 #include "tests/keep_vulkan_loaded.h"
@@ -12,6 +13,8 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <filesystem>
 #include <iostream>
 #include <memory>
@@ -54,6 +57,22 @@ inline std::shared_ptr<const Scene> scene_of_model(const CadModel& model)
     for (const DroppedFace& face : image.dropped)
         ADD_FAILURE() << "face " << face.face_in_part << ": " << image.strings.strings[face.reason];
     return scene_of_image(image);
+}
+
+/// A picture of the model's bounds, whole, from iso at 35 degrees.
+inline RenderOptions from_iso(const PackImage& image, uint32_t width, uint32_t height)
+{
+    RenderOptions options;
+    options.width = width;
+    options.height = height;
+    const auto reach = [&](const std::array<double, 3>& direction) {
+        double sum = 0;
+        for (size_t i = 0; i < 3; ++i)
+            sum += std::max(direction[i] * image.bounds_lo_mm[i], direction[i] * image.bounds_hi_mm[i]);
+        return sum;
+    };
+    EXPECT_TRUE(standard_view("iso", reach, double(width) / height, 35, options.camera));
+    return options;
 }
 
 inline std::shared_ptr<const Scene> scene_of_file(const std::string& path)

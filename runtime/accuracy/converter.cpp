@@ -10,6 +10,7 @@
 #include <cstring>
 #include <fcntl.h>
 #include <filesystem>
+#include <fstream>
 #include <spawn.h>
 #include <sys/wait.h>
 #include <system_error>
@@ -41,8 +42,9 @@ Error cannot_run(const std::string& program, int code)
     return Error{ErrorCode::Internal, program, fmt::format("cannot be run: {}", std::strerror(code))};
 }
 
-/// What a program prints on stdout, and its exit code.
-Result<std::pair<std::string, int>> output_of(const std::string& program, std::vector<std::string> arguments)
+/// What a program prints on stdout, and its exit code. Its stderr goes to the file `log`.
+Result<std::pair<std::string, int>> output_of(const std::string& program, std::vector<std::string> arguments,
+                                              const std::string& log)
 {
     arguments.insert(arguments.begin(), program);
     std::vector<char*> argv;
@@ -55,6 +57,7 @@ Result<std::pair<std::string, int>> output_of(const std::string& program, std::v
     posix_spawn_file_actions_t actions;
     posix_spawn_file_actions_init(&actions);
     posix_spawn_file_actions_adddup2(&actions, pipe.ends[1], STDOUT_FILENO);
+    posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, log.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
     pid_t child = -1;
     const int failed = posix_spawn(&child, program.c_str(), &actions, nullptr, argv.data(), environ);
     posix_spawn_file_actions_destroy(&actions);
@@ -74,6 +77,17 @@ Result<std::pair<std::string, int>> output_of(const std::string& program, std::v
     while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
     }
     return std::pair{std::move(text), WIFEXITED(status) ? WEXITSTATUS(status) : int{kExitInternal}};
+}
+
+/// "no reason given": there is none.
+std::string last_line(const std::string& path)
+{
+    std::ifstream file(path);
+    std::string last = "no reason given";
+    for (std::string line; std::getline(file, line);)
+        if (!line.empty())
+            last = line;
+    return last;
 }
 
 ErrorCode code_of(int exit_code)
@@ -103,10 +117,13 @@ Result<ScratchFolder> ScratchFolder::make()
 {
     std::error_code failed;
     const fs::path parent = fs::temp_directory_path(failed);
-    std::string name = (failed ? fs::path("/tmp") : parent) / "trimray-accuracy-XXXXXX";
+    if (failed)
+        return Error{ErrorCode::FileNotWritable, "temporary folder",
+                     fmt::format("{}; set TMPDIR to a folder that exists", failed.message())};
+    std::string name = parent / "trimray-accuracy-XXXXXX";
     if (::mkdtemp(name.data()) == nullptr)
         return Error{ErrorCode::FileNotWritable, name,
-                     fmt::format("cannot be made: {}; set TMPDIR to a folder that exists", std::strerror(errno))};
+                     fmt::format("cannot be made: {}; set TMPDIR to a folder with room", std::strerror(errno))};
     return ScratchFolder(std::move(name));
 }
 
@@ -126,16 +143,31 @@ Result<Json> run_converter(const std::string& model, const std::string& output, 
         return program.error();
     std::vector<std::string> arguments{model, "-o", output, "--json"};
     arguments.insert(arguments.end(), options.begin(), options.end());
-    const auto ran = output_of(*program, arguments);
+    const std::string log = output + ".log";
+    const auto ran = output_of(*program, arguments, log);
     if (!ran.ok())
         return ran.error();
     const auto& [text, exit_code] = *ran;
     if (exit_code != kExitOk && exit_code != kExitPartial)
-        return Error{code_of(exit_code), model, "was not converted; the reason is above"};
+        return Error{code_of(exit_code), model, "was not converted: " + last_line(log)};
     Json report = Json::parse(text, nullptr, false);
     if (report.is_discarded())
         return Error{ErrorCode::Internal, *program, "its report is no JSON"};
     return report;
+}
+
+std::vector<std::string> losses(const Json& report)
+{
+    std::vector<std::string> lost;
+    if (const Json& dropped = report["dropped"]; !dropped.empty())
+        lost.push_back(fmt::format("{} faces are missing, the first (face {} of part {}) because: {}", dropped.size(),
+                                   dropped[0]["face"].get<size_t>(), dropped[0]["part"].get<size_t>(),
+                                   dropped[0]["reason"].get<std::string>()));
+    if (report.contains("without_triangles") && !report["without_triangles"].empty())
+        lost.push_back(fmt::format("{} faces have no triangles", report["without_triangles"].size()));
+    for (const Json& warning : report["warnings"])
+        lost.push_back(warning.get<std::string>());
+    return lost;
 }
 
 } // namespace trimray

@@ -15,7 +15,7 @@ bool is_cad_file(const std::string& path);
 /// A folder for files of this process alone, removed with all that is in it when this object goes.
 class ScratchFolder {
 public:
-    /// Fails: FileNotWritable.
+    /// In the system's temporary folder. Fails: FileNotWritable.
     static Result<ScratchFolder> make();
     ScratchFolder(ScratchFolder&& other) noexcept;
     ScratchFolder& operator=(ScratchFolder&&) = delete;
@@ -28,10 +28,13 @@ private:
     std::string path_; // empty: moved from
 };
 
-/// Runs `trimray-pack MODEL -o OUTPUT OPTIONS --json` and gives what it reports: a model of which some faces were
-/// dropped too. Its messages go to our stderr. Fails: UnsupportedFormat (there is no such program, or no such format);
-/// as its exit code says.
+/// Runs `trimray-pack MODEL -o OUTPUT OPTIONS --json` and gives what it reports, also of a model that is not whole then
+/// (losses). What it says on stderr is kept in OUTPUT.log. Fails: UnsupportedFormat (there is no such program, or no
+/// such format); as its exit code says, with its last words.
 Result<Json> run_converter(const std::string& model, const std::string& output,
                            const std::vector<std::string>& options);
+
+/// What a report of trimray-pack says is not there, or doubtful: faces dropped, faces without triangles, its warnings.
+std::vector<std::string> losses(const Json& report);
 
 } // namespace trimray

@@ -83,7 +83,7 @@ Result<ModelReport> measure_model(const std::string& model, const AccuracyOption
     if (is_cad_file(model)) {
         pack = scratch->file("own.tray");
         progress("converting");
-        const Result<Preparation> made = make_own_pack(model, pack, options);
+        const Result<Preparation> made = make_own_pack(model, pack, options, report.notes);
         if (!made.ok())
             return made.error();
         preparation = *made;
@@ -95,14 +95,19 @@ Result<ModelReport> measure_model(const std::string& model, const AccuracyOption
     report.faces = uint32_t((*scene)->pack.image.faces.size());
     report.instances = uint32_t((*scene)->pack.image.instances.size());
     progress("cutting leaves, making textures");
-    Result<std::vector<Contender>> contenders = make_contenders(*scene, options);
+    std::string note;
+    Result<std::vector<Contender>> contenders = make_contenders(*scene, options, note);
     if (!contenders.ok())
         return contenders.error();
+    if (!note.empty())
+        report.notes.push_back(note);
     device = contenders->front().tracer->device_name();
     for (const Contender& contender : *contenders)
         report.contenders.push_back({contender.dial, contender.name, {}});
     report.contenders.front().preparation = preparation;
     if (preparation) {
+        if (contenders->front().tracer->device_kind() != DeviceKind::Cpu)
+            report.notes.push_back("Peers, and all first pictures, are traced on the CPU");
         Result<Peers> peers = make_peers(model, *scene, *scratch, options, progress);
         if (!peers.ok())
             return peers.error();
@@ -157,16 +162,22 @@ int run(Arguments arguments, const std::string& command)
 
     AccuracyReport report{
         command, fmt::format("{:%FT%TZ}", fmt::gmtime(std::chrono::system_clock::now())), "", options, {}};
+    int exit_code = kExitOk; // of the first that fails; the others are measured
     for (const std::string& file : arguments.models) {
         Result<ModelReport> model = measure_model(file, options, report.device);
         show_progress("");
-        if (!model.ok())
-            return report_error(model.error());
+        if (!model.ok()) {
+            const int failed_code = report_error(model.error());
+            exit_code = exit_code == kExitOk ? failed_code : exit_code;
+            continue;
+        }
         report.models.push_back(std::move(*model));
         // after every model: what is measured is kept, whatever comes
         if (const Status written = write_report(report, arguments.folder); !written.ok())
             return report_error(written.error());
     }
+    if (report.models.empty())
+        return exit_code;
     if (times_spread(report) > kBusySpread)
         report_note(fmt::format("the machine was busy: times wobbled by {:.0f} %; measure again when it is idle",
                                 100 * times_spread(report)));
@@ -174,7 +185,7 @@ int run(Arguments arguments, const std::string& command)
         print_json(report_json(report));
     else
         fmt::print("{}\n", (fs::path(arguments.folder) / "report.html").string());
-    return kExitOk;
+    return exit_code;
 }
 
 } // namespace

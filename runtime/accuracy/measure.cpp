@@ -71,7 +71,7 @@ uint64_t bytes_read(const Scene& scene, TrimMode trim)
 }
 
 Result<std::vector<Contender>> make_contenders(const std::shared_ptr<const Scene>& scene,
-                                               const AccuracyOptions& options)
+                                               const AccuracyOptions& options, std::string& note)
 {
     const Result<KdTrims>& kd = scene->prepared->kd_trims();
     if (!kd.ok())
@@ -79,9 +79,9 @@ Result<std::vector<Contender>> make_contenders(const std::shared_ptr<const Scene
     std::vector<Contender> contenders;
     for (const AccuracySetting& setting : accuracy_settings(options.quick)) {
         const std::shared_ptr<const Scene> own = scene_of(scene, setting, double(kd->size_bytes()));
-        std::string note;
+        std::string none;
         Result<std::unique_ptr<Tracer>> tracer =
-            make_tracer(own, setting.in_double ? "reference" : options.device, note);
+            setting.in_double ? make_tracer(own, "reference", none) : make_tracer(own, options.device, note);
         if (!tracer.ok())
             return tracer.error();
         const TrimMode trim = setting.trims ? setting.trims->mode : TrimMode::Exact;

@@ -54,9 +54,10 @@ struct AccuracyOptions {
 uint64_t bytes_read(const Scene& scene, TrimMode trim);
 
 /// The pack's own contenders, the default first: one for each of accuracy_settings(). Those that cut leaves or make
-/// textures have copies of the pack. Fails: as make_tracer, derive_kd.
+/// textures have copies of the pack. `note`: which device was taken and why, as make_tracer. Fails: as make_tracer,
+/// derive_kd.
 Result<std::vector<Contender>> make_contenders(const std::shared_ptr<const Scene>& scene,
-                                               const AccuracyOptions& options);
+                                               const AccuracyOptions& options, std::string& note);
 
 /// A round makes every picture once, in order and the next round backwards, so that a slow drift of the machine falls
 /// on all alike; each is made twice in a row and timed the second time, with the caches as a viewer has them. Errors

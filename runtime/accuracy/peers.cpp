@@ -107,6 +107,7 @@ public:
             peers.notes.push_back("the paper's shape of tracer: " + scene.error().detail);
             return;
         }
+        note_losses("the paper's shape of tracer", *report, peers);
         const Preparation preparation{seconds_of(*report), size_of_file(pack), {}, {}};
         const uint64_t bytes = bytes_read(**scene, TrimMode::Kd);
         add(peers,
@@ -142,6 +143,7 @@ public:
             peers.notes.push_back(name + ": " + first.error().detail);
             return;
         }
+        note_losses(name, *report, peers);
         Result<std::unique_ptr<Tracer>> tracer = open_mesh(file);
         const Preparation preparation{seconds_of(*report), size_of_file(file), *first,
                                       (*report)["triangles"].get<uint64_t>()};
@@ -152,6 +154,14 @@ public:
     }
 
 private:
+    /// Faces that are missing; warnings are the own pack's too, which has noted them.
+    static void note_losses(const std::string& name, Json report, Peers& peers)
+    {
+        report["warnings"].clear();
+        for (const std::string& loss : losses(report))
+            peers.notes.push_back(name + ": " + loss);
+    }
+
     static void add(Peers& peers, Contender contender, const Preparation& preparation)
     {
         peers.contenders.push_back(std::move(contender));
@@ -171,11 +181,14 @@ std::vector<double> mesh_deflections(bool quick)
     return quick ? std::vector{1e-2, 1e-3, 1e-4} : std::vector{1e-2, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5};
 }
 
-Result<Preparation> make_own_pack(const std::string& model, const std::string& pack, const AccuracyOptions& options)
+Result<Preparation> make_own_pack(const std::string& model, const std::string& pack, const AccuracyOptions& options,
+                                  std::vector<std::string>& notes)
 {
     const Result<Json> report = run_converter(model, pack, {"--no-previews"});
     if (!report.ok())
         return report.error();
+    for (const std::string& loss : losses(*report))
+        notes.push_back("the pack: " + loss);
     const Result<std::shared_ptr<const Scene>> scene = load_scene(pack);
     if (!scene.ok())
         return scene.error();

@@ -27,19 +27,20 @@ struct Preparation {
 struct Peers {
     std::vector<Contender> contenders;
     std::vector<Preparation> preparations; // by contender
-    std::vector<std::string> notes;        // peers that could not be made, and why
+    std::vector<std::string> notes;        // peers that could not be made, and why; what is not in others
 };
 
 /// Deflections of the meshes, shares of the model's diagonal, coarse to fine.
 std::vector<double> mesh_deflections(bool quick);
 
-/// Makes the pack that a user would: native surfaces, everything stored but previews. Fails: as run_converter,
-/// load_scene.
-Result<Preparation> make_own_pack(const std::string& model, const std::string& pack, const AccuracyOptions& options);
+/// Makes the pack that a user would: native surfaces, everything stored but previews. Notes what is not in it.
+/// Fails: as run_converter, load_scene.
+Result<Preparation> make_own_pack(const std::string& model, const std::string& pack, const AccuracyOptions& options,
+                                  std::vector<std::string>& notes);
 
 /// The paper's shape (all Bezier patches, one leaf each, kd-trees, one ray at a time), the same by our wide tracer,
-/// with the paper's textures too, and a mesh at each deflection, traced by Embree. `scene` is the model's own pack,
-/// whose views all have. A peer that cannot be made is noted. Fails: as bench_view.
+/// with the paper's textures too, and a mesh at each deflection, traced by Embree; all on the CPU. `scene` is the
+/// model's own pack, whose views all have. A peer that cannot be made is noted. Fails: as bench_view.
 Result<Peers> make_peers(const std::string& model, const std::shared_ptr<const Scene>& scene,
                          const ScratchFolder& scratch, const AccuracyOptions& options,
                          const std::function<void(const std::string&)>& progress);

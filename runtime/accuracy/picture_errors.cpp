@@ -109,20 +109,4 @@ PictureErrors picture_errors(ReferencePicture& reference, const Frame& frame)
     return errors;
 }
 
-std::vector<float> error_map(const ReferencePicture& reference, const Frame& frame, double worst_px)
-{
-    const Frame& right = reference.frame();
-    std::vector<float> map(right.depth_mm.size(), 0.0f);
-    for (size_t i = 0; i < map.size(); ++i) {
-        const bool hit = hits(frame, i), right_hit = hits(right, i);
-        if (hit != right_hit)
-            map[i] = 1;
-        else if (hit) {
-            const double off = std::abs(double(frame.depth_mm[i]) - double(right.depth_mm[i]));
-            map[i] = float(std::min(1.0, off / (worst_px * reference.footprint_mm(i))));
-        }
-    }
-    return map;
-}
-
 } // namespace trimray

@@ -35,8 +35,4 @@ struct PictureErrors {
 /// Domain: `frame` is of the reference's view and size, shaded.
 PictureErrors picture_errors(ReferencePicture& reference, const Frame& frame);
 
-/// The error of each pixel as a grey from 0 (none) to 1 (`worst_px` widths of a pixel in depth, or another answer), row
-/// by row.
-std::vector<float> error_map(const ReferencePicture& reference, const Frame& frame, double worst_px);
-
 } // namespace trimray
