@@ -18,19 +18,19 @@ const std::vector<ExternalCommand>& external_commands()
 {
     static const std::vector<ExternalCommand> commands = {
         {"pack", "trimray-pack", "Convert a STEP, IGES or BREP model into a scene pack"},
-        {"bench accuracy", "trimray-accuracy", "What each digit costs in time and memory, as a report"},
+        {"bench accuracy", "trimray-measure", "What each digit costs in time and memory, as a report"},
     };
     return commands;
 }
 
-size_t words_of(const ExternalCommand& command, const std::vector<std::string>& arguments)
+bool is_asked_for(const ExternalCommand& command, const std::vector<std::string>& arguments)
 {
-    const std::string name = command.name;
-    const size_t space = name.find(' ');
-    if (space == std::string::npos)
-        return !arguments.empty() && arguments[0] == name ? 1 : 0;
-    return arguments.size() > 1 && arguments[0] == name.substr(0, space) && arguments[1] == name.substr(space + 1) ? 2
-                                                                                                                   : 0;
+    std::istringstream words(command.name);
+    size_t i = 0;
+    for (std::string word; words >> word; ++i)
+        if (i >= arguments.size() || arguments[i] != word)
+            return false;
+    return true;
 }
 
 void register_externals(CLI::App& app, const std::string& parent)

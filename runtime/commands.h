@@ -22,15 +22,16 @@ void register_thumbnail(CLI::App& app, int& exit_code);
 void register_preview(CLI::App& app, int& exit_code);
 void register_version(CLI::App& app, int& exit_code);
 
-/// Programs of their own that run as subcommands, as git's do: `trimray pack` runs `trimray-pack` with all arguments.
+/// Programs of their own that run as subcommands, as git's do: `trimray pack` runs `trimray-pack` with all arguments
+/// after the first word.
 struct ExternalCommand {
-    const char* name; // one word, or two: a subcommand's subcommand
+    const char* name; // one word, or two: a subcommand's subcommand, whose program has several
     const char* program;
     const char* summary;
 };
 const std::vector<ExternalCommand>& external_commands();
-/// How many of the first arguments are the command's name; 0: it is not asked for.
-size_t words_of(const ExternalCommand& command, const std::vector<std::string>& arguments);
+/// Whether the first arguments are the command's name.
+bool is_asked_for(const ExternalCommand& command, const std::vector<std::string>& arguments);
 /// Lists those of one word, or those whose first word is `parent`, in the help of `app`.
 void register_externals(CLI::App& app, const std::string& parent = "");
 

@@ -96,8 +96,8 @@ int run(const std::vector<std::string>& arguments)
     }
     const std::string& name = arguments.front();
     for (const ExternalCommand& command : external_commands())
-        if (const size_t words = words_of(command, arguments); words > 0)
-            return run_external(command, {arguments.begin() + std::ptrdiff_t(words), arguments.end()});
+        if (is_asked_for(command, arguments))
+            return run_external(command, {arguments.begin() + 1, arguments.end()});
     if (!name.starts_with("-") && find_command(app, name) == nullptr) {
         const std::string near = nearest_word(name, command_names(app));
         return usage_error("", fmt::format("no command '{}'", name),

@@ -1,6 +1,6 @@
 // The mesh tracer: pictures of triangles against closed forms, and of a meshed model beside those of its surfaces.
 #include "preprocess/collect_mesh.h"
-#include "runtime/accuracy/mesh_tracer.h"
+#include "runtime/measure/mesh_tracer.h"
 #include "tests/traced_file.h"
 
 #include <gtest/gtest.h>

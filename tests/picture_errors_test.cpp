@@ -1,6 +1,6 @@
 // How far pictures are from the reference's, on pictures whose errors are known because they were put there.
-#include "runtime/accuracy/picture_errors.h"
-#include "runtime/accuracy/ssim.h"
+#include "runtime/measure/picture_errors.h"
+#include "runtime/measure/ssim.h"
 #include "tests/closed_forms.h"
 
 #include <gtest/gtest.h>

@@ -4,7 +4,7 @@ there, in words too, sorting works, and nothing is asked of a network.
 
     report_page_test.py --bin FOLDER [unittest's own arguments]
 
-FOLDER holds trimray and trimray-accuracy. Without Chromium the test is skipped, and says so (exit code 77).
+FOLDER holds trimray and trimray-measure. Without Chromium the test is skipped, and says so (exit code 77).
 """
 
 import argparse

@@ -1,8 +1,9 @@
-// trimray-accuracy: `trimray bench accuracy` runs it. What each digit costs on given models, as a report.
+// What each digit costs on given models, as a report.
 #include "format/pack_writer.h"
-#include "runtime/accuracy/report.h"
 #include "runtime/command_report.h"
 #include "runtime/command_trace.h"
+#include "runtime/measure/commands.h"
+#include "runtime/measure/report.h"
 
 #include <CLI/CLI.hpp>
 #include <fmt/chrono.h>
@@ -11,6 +12,7 @@
 #include <algorithm>
 #include <chrono>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -18,8 +20,8 @@
 #include <unistd.h>
 #include <vector>
 
+namespace trimray {
 namespace {
-using namespace trimray;
 namespace fs = std::filesystem;
 
 struct Arguments {
@@ -41,27 +43,6 @@ constexpr const char* kFooter =
     "  trimray bench accuracy model.step -o report\n"
     "  trimray bench accuracy part.tray board.tray -o report --quick --size 320x180\n"
     "\nWrites report.html, report.json and report.csv.";
-
-/// As a shell takes it.
-std::string shell_word(const std::string& word)
-{
-    const bool plain = !word.empty() && word.find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ"
-                                                               "0123456789_-./,=:%+@") == std::string::npos;
-    if (plain)
-        return word;
-    std::string out = "'";
-    for (const char c : word)
-        out += c == '\'' ? std::string("'\\''") : std::string(1, c);
-    return out + '\'';
-}
-
-std::string command_line(int argc, char** argv)
-{
-    std::string line = "trimray bench accuracy";
-    for (int i = 1; i < argc; ++i)
-        line += ' ' + shell_word(argv[i]);
-    return line;
-}
 
 void show_progress(const std::string& text)
 {
@@ -190,39 +171,29 @@ int run(Arguments arguments, const std::string& command)
 
 } // namespace
 
-int main(int argc, char** argv)
+void register_accuracy(CLI::App& app, const std::string& command_line, int& exit_code)
 {
-    CLI::App app{"What accuracy costs in time and memory, measured on given models", "trimray bench accuracy"};
-    Arguments arguments;
-    app.add_option("MODEL", arguments.models, "CAD files, which have peers, or scene packs (.tray), which have none")
+    CLI::App* command =
+        app.add_subcommand("accuracy", "What accuracy costs in time and memory, measured on given models");
+    const auto a = std::make_shared<Arguments>();
+    command->add_option("MODEL", a->models, "CAD files, which have peers, or scene packs (.tray), which have none")
         ->required();
-    app.add_option("-o,--output", arguments.folder, "The report's folder; made where it is missing")->required();
-    app.add_flag("--quick", arguments.options.quick, "Fewer values a dial, three rounds at most");
-    app.add_option("--device", arguments.options.device, "cpu, vulkan or auto")->capture_default_str();
-    app.add_option("--views", arguments.views, "How many: iso, top, a close-up, front, right, back, left, bottom")
+    command->add_option("-o,--output", a->folder, "The report's folder; made where it is missing")->required();
+    command->add_flag("--quick", a->options.quick, "Fewer values a dial, three rounds at most");
+    command->add_option("--device", a->options.device, "cpu, vulkan or auto")->capture_default_str();
+    command->add_option("--views", a->views, "How many: iso, top, a close-up, front, right, back, left, bottom")
         ->check(CLI::Range(1, 8))
         ->capture_default_str();
-    app.add_option("--size", arguments.size, "WIDTHxHEIGHT in pixels")->capture_default_str();
-    app.add_option("--rounds", arguments.options.rounds, "How often each picture is timed")
+    command->add_option("--size", a->size, "WIDTHxHEIGHT in pixels")->capture_default_str();
+    command->add_option("--rounds", a->options.rounds, "How often each picture is timed")
         ->check(CLI::Range(1u, 1000u))
         ->capture_default_str();
-    app.add_option("--threads", arguments.options.threads, "CPU threads; 0: all cores")
+    command->add_option("--threads", a->options.threads, "CPU threads; 0: all cores")
         ->check(CLI::Range(0u, 1024u))
         ->capture_default_str();
-    app.add_flag("--json", arguments.json, "Print the report as one JSON object");
-    app.footer(kFooter);
-    try {
-        app.parse(argc, argv);
-    } catch (const CLI::ParseError& error) {
-        if (error.get_exit_code() == 0)
-            return app.exit(error);
-        return report_error({ErrorCode::Usage, "bench accuracy", fmt::format("{}; see --help", error.what())});
-    }
-    try {
-        return run(std::move(arguments), command_line(argc, argv));
-    } catch (const std::bad_alloc&) {
-        return report_error({ErrorCode::Internal, "", "out of memory; ask for smaller pictures"});
-    } catch (const std::exception& error) {
-        return report_error({ErrorCode::Internal, "", error.what()});
-    }
+    command->add_flag("--json", a->json, "Print the report as one JSON object");
+    command->footer(kFooter);
+    command->callback([a, command_line, &exit_code] { exit_code = run(*a, command_line); });
 }
+
+} // namespace trimray

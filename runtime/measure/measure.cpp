@@ -1,4 +1,4 @@
-#include "runtime/accuracy/measure.h"
+#include "runtime/measure/measure.h"
 
 #include "runtime/bench_view.h"
 #include "runtime/command_json.h"

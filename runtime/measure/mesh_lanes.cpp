@@ -1,13 +1,13 @@
 // Compiled once for each target by foreach_target.h, as runtime/cpu_lanes.cpp is.
 #define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3_DL)
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "runtime/accuracy/mesh_lanes.cpp"
+#define HWY_TARGET_INCLUDE "runtime/measure/mesh_lanes.cpp"
 #include <hwy/foreach_target.h>
 
-#include "runtime/accuracy/mesh_lanes.h"
 #include "runtime/cpu_lanes.h"
 #include "runtime/cpu_light.h"
 #include "runtime/cpu_write.h"
+#include "runtime/measure/mesh_lanes.h"
 
 #include <hwy/cache_control.h>
 

@@ -2,8 +2,8 @@
 #pragma once
 
 #include "format/result.h"
-#include "runtime/accuracy/converter.h"
-#include "runtime/accuracy/measure.h"
+#include "runtime/measure/converter.h"
+#include "runtime/measure/measure.h"
 
 #include <cstdint>
 #include <functional>

@@ -1,4 +1,4 @@
-#include "runtime/accuracy/report.h"
+#include "runtime/measure/report.h"
 
 #include "runtime/median.h"
 

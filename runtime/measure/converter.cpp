@@ -1,4 +1,4 @@
-#include "runtime/accuracy/converter.h"
+#include "runtime/measure/converter.h"
 
 #include "runtime/commands.h"
 
@@ -120,7 +120,7 @@ Result<ScratchFolder> ScratchFolder::make()
     if (failed)
         return Error{ErrorCode::FileNotWritable, "temporary folder",
                      fmt::format("{}; set TMPDIR to a folder that exists", failed.message())};
-    std::string name = parent / "trimray-accuracy-XXXXXX";
+    std::string name = parent / "trimray-measure-XXXXXX";
     if (::mkdtemp(name.data()) == nullptr)
         return Error{ErrorCode::FileNotWritable, name,
                      fmt::format("cannot be made: {}; set TMPDIR to a folder with room", std::strerror(errno))};

@@ -2,9 +2,9 @@
 // packets with ClosestPolicy::Stochastic.
 #pragma once
 
-#include "runtime/accuracy/one_ray_scene.h"
-#include "runtime/accuracy/one_ray_trim.h"
 #include "runtime/face_uv.h"
+#include "runtime/measure/one_ray_scene.h"
+#include "runtime/measure/one_ray_trim.h"
 #include "runtime/patch_normal.h"
 #include "runtime/tracer.h"
 #include "shaders/shared/leaf_start.h"

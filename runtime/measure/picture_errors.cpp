@@ -1,6 +1,6 @@
-#include "runtime/accuracy/picture_errors.h"
+#include "runtime/measure/picture_errors.h"
 
-#include "runtime/accuracy/ssim.h"
+#include "runtime/measure/ssim.h"
 #include "runtime/psnr.h"
 
 #include <algorithm>

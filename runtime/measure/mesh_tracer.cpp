@@ -1,10 +1,10 @@
-#include "runtime/accuracy/mesh_tracer.h"
+#include "runtime/measure/mesh_tracer.h"
 
 #include "format/pack_image.h"
-#include "runtime/accuracy/mesh_lanes.h"
 #include "runtime/effect_plan.h"
 #include "runtime/frame_effects.h"
 #include "runtime/frame_size.h"
+#include "runtime/measure/mesh_lanes.h"
 #include "runtime/timed_frames.h"
 
 #include <algorithm>

@@ -1,8 +1,8 @@
 // What an accuracy report holds, and its forms.
 #pragma once
 
-#include "runtime/accuracy/peers.h"
 #include "runtime/command_json.h"
+#include "runtime/measure/peers.h"
 
 #include <cstdint>
 #include <optional>
@@ -33,7 +33,7 @@ struct AccuracyReport {
     std::vector<ModelReport> models;
 };
 
-/// "report.json": `schema` counts up when a key changes its meaning. Documented in runtime/accuracy/REPORT.md.
+/// "report.json": `schema` counts up when a key changes its meaning. Documented in runtime/measure/REPORT.md.
 Json report_json(const AccuracyReport& report);
 
 /// One line a model, view and contender, after a line of column names; the same numbers as in the JSON.

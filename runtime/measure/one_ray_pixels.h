@@ -1,8 +1,8 @@
 // A ray's hit -> the frame: what runtime/cpu_write.h does for packets.
 #pragma once
 
-#include "runtime/accuracy/one_ray_hits.h"
 #include "runtime/face_colors.h"
+#include "runtime/measure/one_ray_hits.h"
 #include "shaders/shared/shading.h"
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-#include "runtime/accuracy/ssim.h"
+#include "runtime/measure/ssim.h"
 
 #include <algorithm>
 #include <array>

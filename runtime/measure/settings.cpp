@@ -1,4 +1,4 @@
-#include "runtime/accuracy/settings.h"
+#include "runtime/measure/settings.h"
 
 #include "runtime/trim_mode.h"
 

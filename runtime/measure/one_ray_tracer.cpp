@@ -1,12 +1,12 @@
 #define TRIMRAY_ONE_RAY // the shared formulas for one ray, not for packets
-#include "runtime/accuracy/one_ray_tracer.h"
+#include "runtime/measure/one_ray_tracer.h"
 
-#include "runtime/accuracy/one_ray_pixels.h"
-#include "runtime/accuracy/one_ray_walk.h"
 #include "runtime/effect_plan.h"
 #include "runtime/eye_side.h"
 #include "runtime/frame_effects.h"
 #include "runtime/frame_size.h"
+#include "runtime/measure/one_ray_pixels.h"
+#include "runtime/measure/one_ray_walk.h"
 #include "runtime/stochastic_frames.h"
 #include "runtime/timed_frames.h"
 

@@ -1,7 +1,7 @@
 // One ray through the top tree and the parts' trees, nearest child first.
 #pragma once
 
-#include "runtime/accuracy/one_ray_hits.h"
+#include "runtime/measure/one_ray_hits.h"
 #include "shaders/shared/leaf_box.h"
 
 SHARED_OPEN

@@ -1,11 +1,11 @@
-#include "runtime/accuracy/peers.h"
+#include "runtime/measure/peers.h"
 
 #include "format/mesh_file.h"
-#include "runtime/accuracy/mesh_tracer.h"
-#include "runtime/accuracy/one_ray_tracer.h"
 #include "runtime/bench_view.h"
 #include "runtime/cpu_view.h"
 #include "runtime/derived_scene.h"
+#include "runtime/measure/mesh_tracer.h"
+#include "runtime/measure/one_ray_tracer.h"
 #include "runtime/median.h"
 
 #include <fmt/format.h>

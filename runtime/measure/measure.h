@@ -3,8 +3,8 @@
 #pragma once
 
 #include "format/result.h"
-#include "runtime/accuracy/picture_errors.h"
-#include "runtime/accuracy/settings.h"
+#include "runtime/measure/picture_errors.h"
+#include "runtime/measure/settings.h"
 #include "runtime/tracer.h"
 
 #include <cstdint>

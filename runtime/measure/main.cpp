@@ -1,0 +1,55 @@
+// trimray-measure: `trimray bench accuracy` runs it, as `trimray-measure accuracy`.
+#include "runtime/command_report.h"
+#include "runtime/measure/commands.h"
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+#include <string>
+
+namespace {
+using namespace trimray;
+
+/// As a shell takes it.
+std::string shell_word(const std::string& word)
+{
+    const bool plain = !word.empty() && word.find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ"
+                                                               "0123456789_-./,=:%+@") == std::string::npos;
+    if (plain)
+        return word;
+    std::string out = "'";
+    for (const char c : word)
+        out += c == '\'' ? std::string("'\\''") : std::string(1, c);
+    return out + '\'';
+}
+
+std::string command_line(int argc, char** argv)
+{
+    std::string line = "trimray bench";
+    for (int i = 1; i < argc; ++i)
+        line += ' ' + shell_word(argv[i]);
+    return line;
+}
+
+} // namespace
+
+int main(int argc, char** argv)
+{
+    CLI::App app{"Trimray measured beside its peers", "trimray bench"};
+    app.require_subcommand(1);
+    int exit_code = kExitOk;
+    register_accuracy(app, command_line(argc, argv), exit_code);
+    try {
+        app.parse(argc, argv);
+    } catch (const CLI::ParseError& error) {
+        if (error.get_exit_code() == 0) // --help
+            return app.exit(error);
+        const std::string command = argc > 1 && app.got_subcommand(argv[1]) ? std::string(" ") + argv[1] : "";
+        return report_error({ErrorCode::Usage, "bench" + command, fmt::format("{}; see --help", error.what())});
+    } catch (const std::bad_alloc&) {
+        return report_error({ErrorCode::Internal, "", "out of memory; ask for smaller pictures"});
+    } catch (const std::exception& error) {
+        return report_error({ErrorCode::Internal, "", error.what()});
+    }
+    return exit_code;
+}
