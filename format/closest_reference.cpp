@@ -81,9 +81,12 @@ Bounds part_bounds(const PatchRecord& patch, const Bounds& own)
 
 /// One ray on its way through the scene.
 struct ClosestReference::Walk {
+    explicit Walk(const Ray& ray) : world(ray), speed(reference::length(ray.direction)) { assert(speed > 0); }
+
     Ray world;
     double speed;              // |direction|: mm a unit of t
     bool shells_alone = false; // meets faces with rims only, all of them
+    std::optional<uint> only;  // meets this face alone
     uint instance = 0;
     Real3 origin_part{}, direction_part{};
     ReferenceHit best;
@@ -229,9 +232,7 @@ bool ClosestReference::begins_outside(const Walk& walk) const
                                                {0.66, -0.44, -0.61}}};
     size_t backs = 0;
     for (const Vec3& direction : kDirections) {
-        Walk probe;
-        probe.world = {walk.world.origin, direction};
-        probe.speed = reference::length(direction);
+        Walk probe({walk.world.origin, direction});
         probe.shells_alone = true;
         intersect_instance(walk.instance, probe);
         backs += probe.best.hit && probe.meets_back(outward_in_part(probe.best.patch, probe.best.uv_patch));
@@ -242,7 +243,8 @@ bool ClosestReference::begins_outside(const Walk& walk) const
 void ClosestReference::intersect_patch(uint patch_id, Walk& walk) const
 {
     const PatchRecord& patch = image_.patches[patch_id];
-    if (walk.shells_alone && (image_.faces[patch.face].flags & kFaceRims) == 0)
+    if ((walk.shells_alone && (image_.faces[patch.face].flags & kFaceRims) == 0) ||
+        walk.only.value_or(patch.face) != patch.face)
         return;
     ++walk.best.patches;
     // to patch space, from the line's point nearest to the patch's origin: there the rest of the way loses nothing
@@ -302,20 +304,30 @@ void ClosestReference::intersect_instance(uint instance, Walk& walk) const
     });
 }
 
-ReferenceHit ClosestReference::closest(const Ray& ray) const
+ReferenceHit ClosestReference::end(Walk walk) const
 {
-    Walk walk;
-    walk.world = ray;
-    walk.speed = reference::length(ray.direction);
-    assert(walk.speed > 0);
-    placed_.walk(ray, walk.t_hi(), [&](uint instance) {
-        intersect_instance(instance, walk);
-        return walk.t_hi();
-    });
     walk.best.open = walk.open_from < walk.best_t;
     if (walk.best.hit)
         finish(walk.best);
     return walk.best;
+}
+
+ReferenceHit ClosestReference::closest(const Ray& ray) const
+{
+    Walk walk(ray);
+    placed_.walk(ray, walk.t_hi(), [&](uint instance) {
+        intersect_instance(instance, walk);
+        return walk.t_hi();
+    });
+    return end(walk);
+}
+
+ReferenceHit ClosestReference::closest_of(const Ray& ray, uint instance, uint face) const
+{
+    Walk walk(ray);
+    walk.only = face;
+    intersect_instance(instance, walk);
+    return end(walk);
 }
 
 /// Unnormalised; axes of the part, a covector.

@@ -55,6 +55,9 @@ public:
     /// The closest hit of a ray in world mm. Domain: finite, direction not 0 (it need not be unit).
     ReferenceHit closest(const reference::Ray& ray) const;
 
+    /// The closest hit of one placed face, as if there were no others: whether it lies where another face was hit.
+    ReferenceHit closest_of(const reference::Ray& ray, uint instance, uint face) const;
+
     /// What a hair changes of `answer`, which is closest(ray)'s: the ray's direction is moved by `reach_px` in eight
     /// directions of the picture, given the changes of direction from pixel to pixel. A jump in depth is one of more
     /// than a pixel's size at that distance. Costs eight rays.
@@ -75,6 +78,7 @@ private:
     bool is_cut_rim(uint patch, const reference::Root& root, const std::array<double, 2>& uv, const Walk& walk) const;
     bool begins_outside(const Walk& walk) const;
     Vec3 outward_in_part(uint patch, const std::array<double, 2>& uv_patch) const;
+    ReferenceHit end(Walk walk) const;
     void finish(ReferenceHit& hit) const;
 
     const PackImage& image_;

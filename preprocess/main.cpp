@@ -238,6 +238,16 @@ const char* state_text(PcurveState state)
     return "within tolerance";
 }
 
+size_t pcurve_count(const CadModel& model)
+{
+    size_t count = 0;
+    for (const CadPart& part : model.parts)
+        for (const CadFace& face : part.faces)
+            for (const CadLoop& loop : face.loops)
+                count += loop.size();
+    return count;
+}
+
 Json trims_json(const DeviationReport& deviations)
 {
     Json worst = Json::array();
@@ -411,7 +421,9 @@ Result<std::string> convert(const Options& options, const SourceFile& source, co
     json["parts"] = image.parts.size();
     json["instances"] = image.instances.size();
     json["faces_instanced"] = instanced;
+    json["pcurves"] = pcurve_count(*model);
     json["patches"] = image.patches.size();
+    json["trim_pieces"] = image.trim_pieces.size();
     json["leaves"] = image.leaves.size();
     json["trims"] = trims_json(gather_deviations(*model));
     json["trims"]["findings"] = finding_counts(report.trim_findings);

@@ -63,6 +63,25 @@ bool ReferencePicture::is_tangent(uint32_t x, uint32_t y)
     return asked == Asked::Tangent;
 }
 
+bool ReferencePicture::is_tie(size_t i, const Frame& frame) const
+{
+    if (frame.face[i] == frame_.face[i] && frame.instance[i] == frame_.instance[i])
+        return false;
+    const PackImage& image = scene_->pack.image;
+    if (size_t(frame.instance[i]) >= image.instances.size() || size_t(frame.face[i]) >= image.faces.size())
+        return false; // a picture of something else than the pack
+    const reference::Ray ray = pixel_ray(rays_, uint32_t(i % width_), uint32_t(i / width_));
+    const ReferenceHit other = closest_.closest_of(ray, uint(frame.instance[i]), uint(frame.face[i]));
+    return other.hit && std::abs(other.distance_mm - double(frame_.depth_mm[i])) <= kHairPx * footprint_mm(i);
+}
+
+Picture ReferencePicture::without_ties(Picture picture, const std::vector<size_t>& ties) const
+{
+    for (const size_t i : ties)
+        std::copy_n(&picture_.rgba[4 * i], 4, &picture.rgba[4 * i]);
+    return picture;
+}
+
 ClosestErrors ReferencePicture::errors(const Frame& frame)
 {
     std::vector<ClosestErrors> rows(height_);
@@ -73,8 +92,11 @@ ClosestErrors ReferencePicture::errors(const Frame& frame)
             const double right = double(frame_.depth_mm[i]), traced = double(frame.depth_mm[i]);
             const bool hits = std::isfinite(right), traced_hits = std::isfinite(traced);
             const bool apart = hits && traced_hits && std::abs(traced - right) > kWrongDepth * footprint_mm(i);
-            if (hits == traced_hits && !apart)
+            if (hits == traced_hits && !apart) {
+                if (hits && is_tie(i, frame))
+                    row.ties.push_back(i);
                 continue;
+            }
             if (is_tangent(x, y))
                 ++row.tangent;
             else
@@ -87,9 +109,10 @@ ClosestErrors ReferencePicture::errors(const Frame& frame)
         sum.extra += row.extra;
         sum.wrong_depth += row.wrong_depth;
         sum.tangent += row.tangent;
+        sum.ties.insert(sum.ties.end(), row.ties.begin(), row.ties.end());
     }
     sum.pixels = uint64_t{width_} * height_;
-    sum.psnr_db = psnr_db(over_white(frame), picture_);
+    sum.psnr_db = psnr_db(without_ties(over_white(frame), sum.ties), picture_);
     return sum;
 }
 

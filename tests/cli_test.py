@@ -817,14 +817,14 @@ class Bench(CliTest):
             report = self.json_of("bench", "accuracy", PACK, "-o", folder, *options, "--json")
             kept = json.loads((folder / "report.json").read_text())
             self.assertEqual(kept, report)
-            self.assertEqual((report["schema"], report["width"], report["height"], report["rounds"]), (1, 48, 36, 1))
+            self.assertEqual((report["schema"], report["width"], report["height"], report["rounds"]), (2, 48, 36, 1))
             self.assertIn(f"trimray bench accuracy {PACK} -o ", report["command"])
             [model] = report["models"]
             self.assertEqual(model["model"], PACK.name)
             contenders = model["contenders"]
-            self.assertEqual(contenders[0], {"dial": "default", "name": "default"})
+            self.assertEqual(contenders[0], {"dial": "default", "name": "default", "paper": None})
             self.assertEqual({row["dial"] for row in contenders},
-                             {"default", "error-px", "leaves", "closest", "trims", "together", "precision"})
+                             {"default", "error-px", "leaves", "closest", "trims", "together", "precision", "anti-aliasing"})
             self.assertEqual(len({row["name"] for row in contenders}), len(contenders))
             self.assertEqual([view["view"] for view in model["views"]], ["iso", "top"])
             for view in model["views"]:
@@ -833,8 +833,12 @@ class Bench(CliTest):
                 for point in view["points"]:
                     self.assertGreater(point["picture_ms"], 0)
                     self.assertGreater(point["bytes"], 0)
-                in_double = view["points"][-1]
+                by_name = {row["name"]: point for row, point in zip(contenders, view["points"])}
+                in_double = by_name["double"]
                 self.assertEqual((in_double["psnr_db"], in_double["ssim"], in_double["wrong_per_million"]), (None, 1, 0))
+                smooth = by_name["2 × 2 samples"]
+                self.assertGreater(smooth["psnr_db"], by_name["one sample"]["psnr_db"])
+                self.assertNotIn("wrong_per_million", smooth, "it is held against another picture")
             rows = list(csv.DictReader((folder / "report.csv").read_text().splitlines()))
             self.assertEqual(len(rows), 2 * len(contenders))
             self.assertEqual(rows[0]["contender"], "default")
@@ -853,18 +857,26 @@ class Bench(CliTest):
         peers = [(row, point) for row, point in zip(of_model["contenders"], of_model["views"][0]["points"])
                  if row["dial"] == "peers"]
         self.assertEqual([row["name"].split(",")[0].split(":")[0] for row, _ in peers],
-                         ["the paper's shape", "the same", "the same"] + 3 * ["triangles"])
+                         ["the paper's shape"] + 3 * ["the same"] + 3 * ["triangles"])
         default = of_model["contenders"][0]
         for row in [default] + [row for row, _ in peers]:
             self.assertGreater(row["make_seconds"], 0)
             self.assertGreater(row["file_bytes"], 0)
         self.assertGreater(default["first_picture_ms"], 0)
+        self.assertEqual([row["paper"] for row, _ in peers], ["one-ray", "wide", "wide-10-frames", "wide-textures"] + 3 * [None])
+        self.assertIn("textures-100", [row["paper"] for row in of_model["contenders"]])
+        counts = of_model["paper"]
+        self.assertEqual(counts["nurbs_surfaces"], of_model["faces"])
+        self.assertGreaterEqual(counts["bezier_surfaces"], counts["nurbs_surfaces"])
+        self.assertGreater(counts["nurbs_curves"], 0)
+        self.assertEqual(counts["bytes"], peers[1][1]["bytes"], "as the contender reads them")
+        self.assertNotIn("paper", of_pack)
         (one_ray, alone), (_, wide) = peers[:2]
         self.assertIn("one ray", one_ray["name"])
         self.assertEqual(alone["wrong_per_million"], wide["wrong_per_million"], "the same pictures, but for rounding")
-        triangles = [row["triangles"] for row, _ in peers[3:]]
+        triangles = [row["triangles"] for row, _ in peers[4:]]
         self.assertEqual(triangles, sorted(set(triangles)))
-        depths = [point["depth_px_mean"] for _, point in peers[3:]]
+        depths = [point["depth_px_mean"] for _, point in peers[4:]]
         self.assertEqual(depths, sorted(depths, reverse=True), "finer meshes lie nearer")
         self.assertLess(of_model["views"][0]["points"][0]["depth_px_mean"], depths[-1])
 

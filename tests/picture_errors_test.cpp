@@ -59,14 +59,28 @@ protected:
     static constexpr uint32_t kSide = 60;
     picture_errors_of()
     {
-        TracedScene ball;
-        add_ball(ball, {0, 0, 0}, 5);
         options_.width = options_.height = kSide;
         options_.camera = {{0, 0, 40}, {0, 0, 0}, {0, 1, 0}, 20};
-        Result<ReferencePicture> made = ReferencePicture::make(ball.finish(), options_);
+        middle_ = kSide / 2 * kSide + kSide / 2;
+        show({5});
+    }
+    /// Balls about the origin, a face each.
+    void show(const std::vector<double>& radii)
+    {
+        TracedScene balls;
+        for (const double radius : radii)
+            add_ball(balls, {0, 0, 0}, radius);
+        Result<ReferencePicture> made = ReferencePicture::make(balls.finish(), options_);
         reference_ = std::make_unique<ReferencePicture>(std::move(*made));
         frame_ = reference_->frame();
-        middle_ = kSide / 2 * kSide + kSide / 2;
+    }
+    /// The pixel shows another face, red and turned away, at the same depth.
+    void repaint(size_t i, int32_t face)
+    {
+        frame_.face[i] = face;
+        frame_.rgba[4 * i] += 0.5f;
+        for (size_t k = 0; k < 3; ++k)
+            frame_.normal[3 * i + k] *= -1;
     }
     PictureErrors errors() { return picture_errors(*reference_, frame_); }
     void miss(size_t i)
@@ -92,6 +106,29 @@ TEST_F(picture_errors_of, the_reference_itself_are_none)
         EXPECT_EQ(zero->largest, 0);
     EXPECT_LT(found.normal_deg.largest, 1e-9);
     EXPECT_EQ(found.leaks, 0u);
+}
+
+TEST_F(picture_errors_of, which_of_two_faces_in_one_place_is_seen_is_open)
+{
+    show({5, 5});
+    repaint(middle_, 1);
+    const PictureErrors found = errors();
+    EXPECT_EQ(found.answers.ties, std::vector<size_t>{middle_});
+    EXPECT_TRUE(std::isinf(found.answers.psnr_db));
+    EXPECT_NEAR(found.ssim, 1, 1e-12);
+    EXPECT_LT(found.normal_deg.largest, 1e-9);
+}
+
+TEST_F(picture_errors_of, a_face_that_lies_behind_the_other_is_no_tie)
+{
+    const double pixel_mm = 35 * 2 * std::tan(10 * kPi / 180) / kSide;
+    show({5, 5 - 0.01 * pixel_mm}); // ten times as far as a hair
+    repaint(middle_, 1);
+    repaint(middle_ + 1, 7); // there is no such face
+    const PictureErrors found = errors();
+    EXPECT_TRUE(found.answers.ties.empty());
+    EXPECT_LT(found.answers.psnr_db, 60);
+    EXPECT_NEAR(found.normal_deg.largest, 180, 1e-6);
 }
 
 TEST_F(picture_errors_of, depths_are_distances_and_widths_of_a_pixel)

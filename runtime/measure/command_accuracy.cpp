@@ -84,7 +84,7 @@ Result<ModelReport> measure_model(const std::string& model, const AccuracyOption
         report.notes.push_back(note);
     device = contenders->front().tracer->device_name();
     for (const Contender& contender : *contenders)
-        report.contenders.push_back({contender.dial, contender.name, {}});
+        report.contenders.push_back({contender.dial, contender.name, contender.paper, contender.smooth, {}});
     report.contenders.front().preparation = preparation;
     if (preparation) {
         if (contenders->front().tracer->device_kind() != DeviceKind::Cpu)
@@ -93,9 +93,11 @@ Result<ModelReport> measure_model(const std::string& model, const AccuracyOption
         if (!peers.ok())
             return peers.error();
         for (size_t i = 0; i < peers->contenders.size(); ++i) {
-            report.contenders.push_back({peers->contenders[i].dial, peers->contenders[i].name, peers->preparations[i]});
-            contenders->push_back(std::move(peers->contenders[i]));
+            Contender& peer = peers->contenders[i];
+            report.contenders.push_back({peer.dial, peer.name, peer.paper, peer.smooth, peers->preparations[i]});
+            contenders->push_back(std::move(peer));
         }
+        report.paper = peers->paper;
         report.notes.insert(report.notes.end(), peers->notes.begin(), peers->notes.end());
     }
     for (const std::string& name : options.views) {

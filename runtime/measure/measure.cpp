@@ -5,10 +5,13 @@
 #include "runtime/command_trace.h"
 #include "runtime/cpu_view.h"
 #include "runtime/derived_scene.h"
+#include "runtime/measure/ssim.h"
 #include "runtime/median.h"
+#include "runtime/psnr.h"
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <numeric>
 #include <utility>
 
@@ -45,11 +48,41 @@ Result<Made> make_picture(const Contender& contender, RenderOptions render)
 {
     contender.ask(render);
     Made made;
-    Result<Frame> frame = contender.tracer->render(render, made.stats);
+    Result<Frame> frame = trace_picture(*contender.tracer, render, contender.samples, made.stats);
     if (!frame.ok())
         return Error{frame.error().code, frame.error().where, contender.name + ": " + frame.error().detail};
     made.frame = std::move(*frame);
     return made;
+}
+
+/// What the smooth contenders are held against, over white; empty where there are none.
+Result<Picture> smooth_picture(const std::vector<Contender>& contenders, const RenderOptions& render)
+{
+    if (std::none_of(contenders.begin(), contenders.end(), [](const Contender& c) { return c.smooth; }))
+        return Picture{};
+    RenderStats stats;
+    const Result<Frame> frame = trace_picture(*contenders.front().tracer, render, kSmoothSamples, stats);
+    if (!frame.ok())
+        return frame.error();
+    return over_white(*frame);
+}
+
+/// Fills in a point's errors and their pictures.
+Status hold_against(ReferencePicture& reference, const Picture& smooth_picture, bool smooth, const Frame& frame,
+                    AccuracyPoint& point)
+{
+    if (smooth) {
+        const Picture picture = over_white(frame);
+        point.errors.answers.psnr_db = psnr_db(picture, smooth_picture);
+        point.errors.ssim = ssim(picture, smooth_picture);
+        return Done{};
+    }
+    point.errors = picture_errors(reference, frame);
+    Result<ErrorPictures> pictures = error_pictures(reference, frame, point.errors.answers.ties);
+    if (!pictures.ok())
+        return pictures.error();
+    point.pictures = std::move(*pictures);
+    return Done{};
 }
 
 } // namespace
@@ -87,8 +120,14 @@ Result<std::vector<Contender>> make_contenders(const std::shared_ptr<const Scene
         const TrimMode trim = setting.trims ? setting.trims->mode : TrimMode::Exact;
         const DeviceKind device = (*tracer)->device_kind();
         const bool counts_all = device == DeviceKind::Vulkan || device == DeviceKind::SoftwareVulkan;
-        Contender contender{
-            setting.dial, setting.name, std::move(*tracer), {}, counts_all ? 0 : bytes_read(*own, trim)};
+        Contender contender;
+        contender.dial = setting.dial;
+        contender.name = setting.name;
+        contender.tracer = std::move(*tracer);
+        contender.bytes = counts_all ? 0 : bytes_read(*own, trim);
+        contender.paper = setting.paper;
+        contender.samples = setting.samples;
+        contender.smooth = setting.smooth;
         contender.ask = [ask = setting.ask, trim](RenderOptions& render) {
             render.trim = trim;
             ask(render);
@@ -114,6 +153,9 @@ Result<AccuracyView> measure_view(const std::string& name, const std::shared_ptr
     Result<ReferencePicture> reference = ReferencePicture::make(scene, render);
     if (!reference.ok())
         return reference.error();
+    const Result<Picture> smooth = smooth_picture(contenders, render);
+    if (!smooth.ok())
+        return smooth.error();
 
     const size_t count = contenders.size();
     AccuracyView view{name, *camera, std::vector<AccuracyPoint>(count)};
@@ -128,7 +170,9 @@ Result<AccuracyView> measure_view(const std::string& name, const std::shared_ptr
             if (!made.ok())
                 return made.error();
             if (round == 0) {
-                point.errors = picture_errors(*reference, made->frame);
+                if (const Status held = hold_against(*reference, *smooth, contenders[i].smooth, made->frame, point);
+                    !held.ok())
+                    return held.error();
                 point.work = made->stats.work;
                 point.bytes = contenders[i].bytes + made->stats.buffer_bytes;
             }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "format/result.h"
+#include "runtime/measure/error_pictures.h"
 #include "runtime/measure/picture_errors.h"
 #include "runtime/measure/settings.h"
 #include "runtime/tracer.h"
@@ -21,7 +22,17 @@ struct Contender {
     std::shared_ptr<Tracer> tracer;
     std::function<void(RenderOptions&)> ask;
     uint64_t bytes = 0; // of the arrays that it reads beside those that RenderStats counts
+    // Whose part it has in the paper's tables (REPORT.md): "one-ray", "wide", "wide-10-frames", "wide-textures" or
+    // "textures-50" (percent); empty: none
+    std::string paper;
+    uint32_t samples = 1; // a pixel, squared
+    // Held against the smooth picture (kSmoothSamples), by its colours alone, not against the reference in double,
+    // which has one sample a pixel
+    bool smooth = false;
 };
+
+/// What pictures with smoothed borders are held against: the default's with so many samples a pixel, squared.
+constexpr uint32_t kSmoothSamples = 6;
 
 struct AccuracyPoint {
     // Of a whole picture, all its frames together; on the CPU with one thread processor time. One a round; what takes
@@ -30,7 +41,8 @@ struct AccuracyPoint {
     double time_to_default = 0; // median over the rounds of its time over the default's in the same round
     WorkCounts work;            // of one frame
     uint64_t bytes = 0;         // the contender's, and those of the picture (RenderStats)
-    PictureErrors errors;
+    PictureErrors errors;       // of a smooth contender: PSNR and SSIM alone
+    ErrorPictures pictures;     // empty where colours are equal, and of a smooth contender
 };
 constexpr double kLongPicture_ms = 1000;
 

@@ -79,13 +79,6 @@ Result<std::unique_ptr<Tracer>> open_mesh(const std::string& path)
     return make_mesh_tracer(std::move(*mesh));
 }
 
-/// The paper's own frame, its first.
-void ask_as_the_paper(RenderOptions& render)
-{
-    render.closest = ClosestPolicy::Stochastic;
-    render.trim = TrimMode::Kd;
-}
-
 /// What is asked of a mesh: nothing, for it has neither trims nor leaves.
 void ask_nothing(RenderOptions&) {}
 
@@ -110,25 +103,21 @@ public:
         note_losses("the paper's shape of tracer", *report, peers);
         const Preparation preparation{seconds_of(*report), size_of_file(pack), {}, {}};
         const uint64_t bytes = bytes_read(**scene, TrimMode::Kd);
-        add(peers,
-            {kDial, "the paper's shape: Bézier, one leaf a patch, kd-trees, one ray", make_one_ray_tracer(*scene),
-             ask_as_the_paper, bytes},
-            preparation);
-        if (Result<std::unique_ptr<Tracer>> wide = make_cpu_tracer(*scene); wide.ok())
-            add(peers, {kDial, "the same, 16 rays wide", std::move(*wide), ask_as_the_paper, bytes}, preparation);
+        add_framed({"the paper's shape: Bézier, one leaf a patch, kd-trees, one ray", "one-ray", TrimMode::Kd, 1},
+                   make_one_ray_tracer(*scene), bytes, preparation, peers);
+        add_framed({"the same, 16 rays wide", "wide", TrimMode::Kd, 1}, make_cpu_tracer(*scene), bytes, preparation,
+                   peers);
+        add_framed({"the same, 16 rays wide, 10 frames", "wide-10-frames", TrimMode::Kd, 10}, make_cpu_tracer(*scene),
+                   bytes, preparation, peers);
         const Result<KdTrims>& kd = (*scene)->prepared->kd_trims();
         if (!kd.ok())
             return;
+        peers.paper = PaperCounts{(*report)["converted"].get<uint64_t>(), (*report)["pcurves"].get<uint64_t>(),
+                                  (*report)["patches"].get<uint64_t>(), (*report)["trim_pieces"].get<uint64_t>(),
+                                  bytes + kd->size_bytes()};
         const auto textured = with_textures(**scene, {TrimSource::Mask, TrimLayout::Square}, double(kd->size_bytes()));
-        if (Result<std::unique_ptr<Tracer>> wide = make_cpu_tracer(textured); wide.ok())
-            add(peers,
-                {kDial, "the same, 16 rays wide, the paper's textures (100 %)", std::move(*wide),
-                 [](RenderOptions& render) {
-                     ask_as_the_paper(render);
-                     render.trim = TrimMode::Sdf;
-                 },
-                 bytes_read(*textured, TrimMode::Sdf)},
-                preparation);
+        add_framed({"the same, 16 rays wide, the paper's textures (100 %)", "wide-textures", TrimMode::Sdf, 1},
+                   make_cpu_tracer(textured), bytes_read(*textured, TrimMode::Sdf), preparation, peers);
     }
 
     void add_mesh(double deflection, Peers& peers) const
@@ -150,10 +139,32 @@ public:
         std::error_code ignored;
         fs::remove(file, ignored); // fine meshes are large
         if (tracer.ok())
-            add(peers, {kDial, name, std::move(*tracer), ask_nothing, 0}, preparation);
+            add(peers, {kDial, name, std::move(*tracer), ask_nothing, 0, ""}, preparation);
     }
 
 private:
+    /// The paper's frames, by one of several tracers.
+    struct Framed {
+        const char *name, *paper; // as Contender's
+        TrimMode trim;
+        uint32_t frames;
+    };
+    static void add_framed(const Framed& framed, Result<std::unique_ptr<Tracer>> tracer, uint64_t bytes,
+                           const Preparation& preparation, Peers& peers)
+    {
+        if (!tracer.ok()) {
+            peers.notes.push_back(fmt::format("{}: {}", framed.name, tracer.error().detail));
+            return;
+        }
+        Contender contender{kDial, framed.name, std::move(*tracer), {}, bytes, framed.paper};
+        contender.ask = [trim = framed.trim, frames = framed.frames](RenderOptions& render) {
+            render.closest = ClosestPolicy::Stochastic;
+            render.trim = trim;
+            render.frames = frames;
+        };
+        add(peers, std::move(contender), preparation);
+    }
+
     /// Faces that are missing; warnings are the own pack's too, which has noted them.
     static void note_losses(const std::string& name, Json report, Peers& peers)
     {

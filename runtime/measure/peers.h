@@ -24,9 +24,17 @@ struct Preparation {
     std::optional<uint64_t> triangles;
 };
 
+/// What the paper's first table counts of a model.
+struct PaperCounts {
+    uint64_t nurbs_surfaces = 0, nurbs_curves = 0;   // faces, and their pcurves
+    uint64_t bezier_surfaces = 0, bezier_curves = 0; // patches, and monotone pieces of trims
+    uint64_t bytes = 0;                              // in memory
+};
+
 struct Peers {
     std::vector<Contender> contenders;
     std::vector<Preparation> preparations; // by contender
+    std::optional<PaperCounts> paper;      // of the paper's shape of tracer
     std::vector<std::string> notes;        // peers that could not be made, and why; what is not in others
 };
 
@@ -39,8 +47,8 @@ Result<Preparation> make_own_pack(const std::string& model, const std::string& p
                                   std::vector<std::string>& notes);
 
 /// The paper's shape (all Bezier patches, one leaf each, kd-trees, one ray at a time), the same by our wide tracer,
-/// with the paper's textures too, and a mesh at each deflection, traced by Embree; all on the CPU. `scene` is the
-/// model's own pack, whose views all have. A peer that cannot be made is noted. Fails: as bench_view.
+/// its tenth frame and with the paper's textures too, and a mesh at each deflection, traced by Embree; all on the CPU.
+/// `scene` is the model's own pack, whose views all have. A peer that cannot be made is noted. Fails: as bench_view.
 Result<Peers> make_peers(const std::string& model, const std::shared_ptr<const Scene>& scene,
                          const ScratchFolder& scratch, const AccuracyOptions& options,
                          const std::function<void(const std::string&)>& progress);

@@ -85,7 +85,8 @@ PictureErrors picture_errors(ReferencePicture& reference, const Frame& frame)
     const Frame& right = reference.frame();
     PictureErrors errors;
     errors.answers = reference.errors(frame);
-    errors.ssim = ssim(over_white(frame), over_white(right));
+    const std::vector<size_t>& ties = errors.answers.ties;
+    errors.ssim = ssim(reference.without_ties(over_white(frame), ties), reference.picture());
     std::vector<double> depth_mm, depth_px, normal_deg, outline_px;
     const NearestAnswer nearest(right);
     for (size_t i = 0; i < right.depth_mm.size(); ++i) {
@@ -94,7 +95,9 @@ PictureErrors picture_errors(ReferencePicture& reference, const Frame& frame)
             const double off = std::abs(double(frame.depth_mm[i]) - double(right.depth_mm[i]));
             depth_mm.push_back(off);
             depth_px.push_back(off / reference.footprint_mm(i));
-            normal_deg.push_back(angle_between(&frame.normal[3 * i], &right.normal[3 * i]) * 180 / std::numbers::pi);
+            if (!std::binary_search(ties.begin(), ties.end(), i)) // the two faces may look away from each other
+                normal_deg.push_back(angle_between(&frame.normal[3 * i], &right.normal[3 * i]) * 180 /
+                                     std::numbers::pi);
         } else if (hit != right_hit) {
             const double away = nearest.distance_px(i, hit);
             outline_px.push_back(std::isfinite(away) ? away - 0.5 : std::hypot(right.width, right.height));

@@ -23,7 +23,7 @@ struct PictureErrors {
     uint64_t both_hit = 0; // pixels that hit in both pictures: of them are
     Spread depth_mm;       // distances between the hits along the ray
     Spread depth_px;       // ... in widths of a pixel there
-    Spread normal_deg;     // angles between the normals
+    Spread normal_deg;     // angles between the normals, but for ties
     // Of pixels that hit in one picture alone: to the nearest pixel of the reference that has the same answer, less
     // one half: how far the outline is off
     Spread outline_px;

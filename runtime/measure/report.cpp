@@ -7,12 +7,14 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <span>
+#include <string_view>
 #include <thread>
 
 namespace trimray {
 namespace {
 
-constexpr int kSchema = 1;
+constexpr int kSchema = 2;
 
 const char kPage[] =
 #include "report.html.inc"
@@ -51,45 +53,66 @@ Json number(double value) // JSON has no infinity: an equal picture has null dec
     return std::isfinite(value) ? Json(value) : Json();
 }
 
+/// A PNG as a page holds it (RFC 2397, RFC 4648).
+std::string data_uri(std::span<const std::byte> png)
+{
+    constexpr std::string_view kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    std::string uri = "data:image/png;base64,";
+    for (size_t i = 0; i < png.size(); i += 3) {
+        const size_t count = std::min<size_t>(3, png.size() - i);
+        uint32_t word = 0;
+        for (size_t k = 0; k < 3; ++k)
+            word = word << 8 | (k < count ? uint32_t(png[i + k]) : 0);
+        for (size_t k = 0; k < 4; ++k)
+            uri += k <= count ? kDigits[word >> (18 - 6 * k) & 63] : '=';
+    }
+    return uri;
+}
+
 double per_ray(uint64_t count, const WorkCounts& work)
 {
     return work.rays > 0 ? double(count) / double(work.rays) : 0;
 }
 
 /// The numbers of a point by column: JSON and CSV have them from here.
-std::vector<std::pair<const char*, double>> numbers(const AccuracyPoint& point, const AccuracyOptions& options)
+std::vector<std::pair<const char*, double>> numbers(const AccuracyPoint& point, const AccuracyOptions& options,
+                                                    bool smooth)
 {
     const PictureErrors& e = point.errors;
     const double ms = median(point.picture_ms);
     const double pixels = double(options.width) * options.height;
-    return {{"picture_ms", ms},
-            {"picture_ms_spread", relative_spread(point.picture_ms)},
-            {"time_to_default", point.time_to_default},
-            {"rays_per_second", pixels / (ms * 1e-3)},
-            {"bytes", double(point.bytes)},
-            {"node_visits", per_ray(point.work.node_visits, point.work)},
-            {"leaf_visits", per_ray(point.work.leaf_visits, point.work)},
-            {"newton_steps", per_ray(point.work.newton_steps, point.work)},
-            {"curve_tests", per_ray(point.work.curve_tests, point.work)},
-            {"uncertified_pixels", double(point.work.uncertified_pixels)},
-            {"psnr_db", e.answers.psnr_db},
-            {"ssim", e.ssim},
-            {"wrong_per_million", e.wrong_per_million()},
-            {"missing", double(e.answers.missing)},
-            {"extra", double(e.answers.extra)},
-            {"wrong_depth", double(e.answers.wrong_depth)},
-            {"tangent", double(e.answers.tangent)},
-            {"leaks", double(e.leaks)},
-            {"depth_mm_mean", e.depth_mm.mean},
-            {"depth_mm_largest", e.depth_mm.largest},
-            {"depth_px_mean", e.depth_px.mean},
-            {"depth_px_at_99", e.depth_px.at_99},
-            {"depth_px_largest", e.depth_px.largest},
-            {"normal_deg_mean", e.normal_deg.mean},
-            {"normal_deg_at_99", e.normal_deg.at_99},
-            {"normal_deg_largest", e.normal_deg.largest},
-            {"outline_px_mean", e.outline_px.mean},
-            {"outline_px_largest", e.outline_px.largest}};
+    std::vector<std::pair<const char*, double>> all{{"picture_ms", ms},
+                                                    {"picture_ms_spread", relative_spread(point.picture_ms)},
+                                                    {"time_to_default", point.time_to_default},
+                                                    {"rays_per_second", pixels / (ms * 1e-3)},
+                                                    {"bytes", double(point.bytes)},
+                                                    {"node_visits", per_ray(point.work.node_visits, point.work)},
+                                                    {"leaf_visits", per_ray(point.work.leaf_visits, point.work)},
+                                                    {"newton_steps", per_ray(point.work.newton_steps, point.work)},
+                                                    {"curve_tests", per_ray(point.work.curve_tests, point.work)},
+                                                    {"uncertified_pixels", double(point.work.uncertified_pixels)},
+                                                    {"psnr_db", e.answers.psnr_db},
+                                                    {"ssim", e.ssim}};
+    if (smooth)
+        return all;
+    all.insert(all.end(), {{"wrong_per_million", e.wrong_per_million()},
+                           {"missing", double(e.answers.missing)},
+                           {"extra", double(e.answers.extra)},
+                           {"wrong_depth", double(e.answers.wrong_depth)},
+                           {"tangent", double(e.answers.tangent)},
+                           {"ties", double(e.answers.ties.size())},
+                           {"leaks", double(e.leaks)},
+                           {"depth_mm_mean", e.depth_mm.mean},
+                           {"depth_mm_largest", e.depth_mm.largest},
+                           {"depth_px_mean", e.depth_px.mean},
+                           {"depth_px_at_99", e.depth_px.at_99},
+                           {"depth_px_largest", e.depth_px.largest},
+                           {"normal_deg_mean", e.normal_deg.mean},
+                           {"normal_deg_at_99", e.normal_deg.at_99},
+                           {"normal_deg_largest", e.normal_deg.largest},
+                           {"outline_px_mean", e.outline_px.mean},
+                           {"outline_px_largest", e.outline_px.largest}});
+    return all;
 }
 
 Json to_json(const Camera& camera)
@@ -99,7 +122,9 @@ Json to_json(const Camera& camera)
 
 Json to_json(const ReportedContender& contender)
 {
-    Json object{{"dial", contender.dial}, {"name", contender.name}};
+    Json object{{"dial", contender.dial},
+                {"name", contender.name},
+                {"paper", contender.paper.empty() ? Json() : Json(contender.paper)}};
     if (const auto& made = contender.preparation) {
         object["make_seconds"] = made->make_seconds;
         object["file_bytes"] = made->file_bytes;
@@ -112,21 +137,69 @@ Json to_json(const ReportedContender& contender)
 Json to_json(const ModelReport& model, const AccuracyOptions& options)
 {
     Json object{{"model", model.name}, {"faces", model.faces}, {"instances", model.instances}, {"notes", model.notes}};
+    if (const auto& paper = model.paper)
+        object["paper"] = {{"nurbs_surfaces", paper->nurbs_surfaces},
+                           {"nurbs_curves", paper->nurbs_curves},
+                           {"bezier_surfaces", paper->bezier_surfaces},
+                           {"bezier_curves", paper->bezier_curves},
+                           {"bytes", paper->bytes}};
     object["contenders"] = Json::array();
     for (const ReportedContender& contender : model.contenders)
         object["contenders"].push_back(to_json(contender));
     object["views"] = Json::array();
     for (const AccuracyView& view : model.views) {
         Json of_view{{"view", view.name}, {"camera", to_json(view.camera)}, {"points", Json::array()}};
-        for (const AccuracyPoint& point : view.points) {
+        for (size_t i = 0; i < view.points.size(); ++i) {
             Json row;
-            for (const auto& [name, value] : numbers(point, options))
+            for (const auto& [name, value] : numbers(view.points[i], options, model.contenders[i].smooth))
                 row[name] = number(value);
             of_view["points"].push_back(std::move(row));
         }
         object["views"].push_back(std::move(of_view));
     }
     return object;
+}
+
+/// Each contender's pictures from the view where it is worst; null: its pictures are equal to the reference's, or it is
+/// a smooth one.
+Json pictures_json(const AccuracyReport& report)
+{
+    Json object{{"steps", Json::array()}, {"wrong", kWrongAnswer}, {"models", Json::array()}};
+    for (const ErrorStep& step : error_steps())
+        object["steps"].push_back({{"depth_px", step.depth_px}, {"srgb", step.srgb}});
+    for (const ModelReport& model : report.models) {
+        Json of_model = Json::array();
+        for (size_t i = 0; i < model.contenders.size(); ++i) {
+            const AccuracyView* worst = nullptr;
+            for (const AccuracyView& view : model.views)
+                if (!worst || view.points[i].pictures.place.difference > worst->points[i].pictures.place.difference)
+                    worst = &view;
+            const ErrorPictures& pictures = worst->points[i].pictures;
+            if (pictures.place.difference == 0) {
+                of_model.push_back(Json());
+                continue;
+            }
+            of_model.push_back({{"view", worst->name},
+                                {"x", pictures.place.x},
+                                {"y", pictures.place.y},
+                                {"width", pictures.place.width},
+                                {"height", pictures.place.height},
+                                {"seen", data_uri(pictures.seen)},
+                                {"right", data_uri(pictures.right)},
+                                {"map", data_uri(pictures.map)}});
+        }
+        object["models"].push_back(std::move(of_model));
+    }
+    return object;
+}
+
+/// Puts JSON where the page has a place for it. "</script>" in a name must not end the script that it is in.
+void fill_in(std::string_view place, const Json& json, std::string& page)
+{
+    std::string text;
+    for (const char c : json.dump(-1, ' ', false, Json::error_handler_t::replace))
+        text += c == '<' ? std::string("\\u003c") : std::string(1, c);
+    page.replace(page.find(place), place.size(), text);
 }
 
 /// As RFC 4180 quotes a field.
@@ -176,20 +249,19 @@ Json report_json(const AccuracyReport& report)
 
 std::string report_html(const AccuracyReport& report)
 {
-    // "</script>" in a name must not end the script that the numbers are in
-    std::string numbers;
-    for (const char c : report_json(report).dump(-1, ' ', false, Json::error_handler_t::replace))
-        numbers += c == '<' ? std::string("\\u003c") : std::string(1, c);
-    constexpr std::string_view kPlace = "@REPORT@";
     std::string page = kPage;
-    page.replace(page.find(kPlace), kPlace.size(), numbers);
+    fill_in("@REPORT@", report_json(report), page);
+    fill_in("@PICTURES@", pictures_json(report), page);
     return page;
 }
 
 std::string report_csv(const AccuracyReport& report)
 {
     std::string csv = "model,view,dial,contender";
-    for (const auto& [name, value] : numbers(AccuracyPoint{{1}, 1, {}, 0, {}}, report.options))
+    AccuracyPoint any;
+    any.picture_ms = {1};
+    const auto columns = numbers(any, report.options, false);
+    for (const auto& [name, value] : columns)
         csv += fmt::format(",{}", name);
     csv += '\n';
     for (const ModelReport& model : report.models)
@@ -197,9 +269,10 @@ std::string report_csv(const AccuracyReport& report)
             for (size_t i = 0; i < view.points.size(); ++i) {
                 csv += fmt::format("{},{},{},{}", quoted(model.name), quoted(view.name),
                                    quoted(model.contenders[i].dial), quoted(model.contenders[i].name));
-                for (const auto& [name, value] : numbers(view.points[i], report.options))
+                const auto row = numbers(view.points[i], report.options, model.contenders[i].smooth);
+                for (const auto& [name, value] : row)
                     csv += std::isfinite(value) ? fmt::format(",{}", value) : ",";
-                csv += '\n';
+                csv += std::string(columns.size() - row.size(), ',') + '\n';
             }
     return csv;
 }

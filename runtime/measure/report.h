@@ -13,7 +13,8 @@ namespace trimray {
 
 /// A contender as the report names it.
 struct ReportedContender {
-    std::string dial, name;
+    std::string dial, name, paper; // as Contender's
+    bool smooth = false;
     std::optional<Preparation> preparation; // of the default, where it was made from a CAD file, and of peers
 };
 
@@ -23,6 +24,7 @@ struct ModelReport {
     std::vector<std::string> notes; // what was left out, and why
     std::vector<ReportedContender> contenders;
     std::vector<AccuracyView> views;
+    std::optional<PaperCounts> paper; // where there are peers
 };
 
 struct AccuracyReport {
@@ -39,7 +41,8 @@ Json report_json(const AccuracyReport& report);
 /// One line a model, view and contender, after a line of column names; the same numbers as in the JSON.
 std::string report_csv(const AccuracyReport& report);
 
-/// "report.html": the same numbers as a page of plots and tables, alone in its file: it needs no network.
+/// "report.html": the same numbers as a page of plots and tables, and each contender's picture where it is worst, alone
+/// in its file: it needs no network.
 std::string report_html(const AccuracyReport& report);
 
 /// Whether times wobbled: the median over all points of (third quartile - first) / median of a point's times.

@@ -77,6 +77,9 @@ void add_trims(bool quick, Settings& settings)
             continue;
         settings.push_back(named("trims", trims_name(trims)));
         settings.back().trims = trims;
+        if (trims.mode == TrimMode::Sdf && trims.textures.source == TrimSource::Mask &&
+            trims.textures.layout == TrimLayout::Square)
+            settings.back().paper = fmt::format("textures-{:g}", 100 * trims.memory);
     }
 }
 
@@ -99,6 +102,19 @@ void add_together(Settings& settings)
     settings.back().cut = [](LeafOptions& leaves) { leaves.leaf_slope_deg = 15; };
 }
 
+// One sample a pixel is the default once more, for these pictures are held against another one than the others
+void add_antialiasing(bool quick, Settings& settings)
+{
+    const auto add = [&](std::string name) -> AccuracySetting& {
+        settings.push_back(named("anti-aliasing", std::move(name)));
+        settings.back().smooth = true;
+        return settings.back();
+    };
+    for (const uint32_t samples : quick ? std::vector{1u, 2u} : std::vector{1u, 2u, 3u, 4u})
+        add(samples == 1 ? "one sample" : fmt::format("{0} × {0} samples", samples)).samples = samples;
+    add("one sample, trims smoothed").ask = [](RenderOptions& options) { options.antialias_trims = true; };
+}
+
 } // namespace
 
 std::vector<AccuracySetting> accuracy_settings(bool quick)
@@ -112,6 +128,7 @@ std::vector<AccuracySetting> accuracy_settings(bool quick)
     add_together(settings);
     settings.push_back(named("precision", "double"));
     settings.back().in_double = true;
+    add_antialiasing(quick, settings);
     return settings;
 }
 
