@@ -130,7 +130,7 @@ class Panel:
         return out
 
 
-def shortened(name, longest=30):
+def shortened(name, longest=22):
     return name if len(name) <= longest else name[:longest - 1] + "…"
 
 
