@@ -17,6 +17,7 @@ import subprocess
 import sys
 import tempfile
 import unittest
+import xml.etree.ElementTree
 import zlib
 from pathlib import Path
 
@@ -850,6 +851,13 @@ class Bench(CliTest):
         with tempfile.TemporaryDirectory() as root:
             report = self.json_of("bench", "accuracy", MODEL, PACK, "-o", root, "--quick", "--size", "64x48", "--views", 1,
                                   "--rounds", 1, "--json")
+            plot = Path(root) / "plot.svg"
+            table = subprocess.run([sys.executable, TESTS / "accuracy_table.py", Path(root) / "report.json", "--plot", plot,
+                                    "--models", MODEL.stem], capture_output=True, text=True, check=True).stdout.splitlines()
+            self.assertEqual(len(table), 3, "a head of two lines, and the model that has peers")
+            self.assertTrue(table[2].startswith(f"| {MODEL.stem} | "))
+            marks = xml.etree.ElementTree.parse(plot).findall(".//{*}path/{*}title")
+            self.assertEqual(len(marks), 2 * 9, "the default, double, 3 of the paper's, textures, and 3 of triangles, twice")
         of_model, of_pack = report["models"]
         self.assertEqual(of_model["notes"], [])
         self.assertIn("CAD file", of_pack["notes"][0])
