@@ -74,6 +74,7 @@ Result<ModelReport> measure_model(const std::string& model, const AccuracyOption
     if (!scene.ok())
         return scene.error();
     report.faces = uint32_t((*scene)->pack.image.faces.size());
+    report.pack_options = (*scene)->pack.image.provenance.options_json;
     report.instances = uint32_t((*scene)->pack.image.instances.size());
     progress("cutting leaves, making textures");
     std::string note;

@@ -3,7 +3,6 @@
 #include "format/mesh_file.h"
 #include "runtime/bench_view.h"
 #include "runtime/cpu_view.h"
-#include "runtime/derived_scene.h"
 #include "runtime/measure/mesh_tracer.h"
 #include "runtime/measure/one_ray_tracer.h"
 #include "runtime/median.h"
@@ -39,9 +38,12 @@ double seconds_of(const Json& report)
     return sum;
 }
 
+using MakeTracer = std::function<Result<std::unique_ptr<Tracer>>(const std::shared_ptr<const Scene>&)>;
+using Ask = std::function<void(RenderOptions&)>; // as Contender's
+
 /// Milliseconds from opening a file to a picture of it, from where `camera` is.
-Result<double> first_picture_ms(const std::function<Result<std::unique_ptr<Tracer>>()>& open, const Camera& camera,
-                                const AccuracyOptions& options)
+Result<double> first_picture_ms(const std::function<Result<std::unique_ptr<Tracer>>()>& open, const Ask& ask,
+                                const Camera& camera, const AccuracyOptions& options)
 {
     constexpr int kTimed = 3;
     std::vector<double> ms;
@@ -54,6 +56,7 @@ Result<double> first_picture_ms(const std::function<Result<std::unique_ptr<Trace
         render.width = options.width;
         render.height = options.height;
         render.camera = camera;
+        ask(render);
         RenderStats stats;
         if (const Result<Frame> frame = (*tracer)->render(render, stats); !frame.ok())
             return frame.error();
@@ -63,12 +66,17 @@ Result<double> first_picture_ms(const std::function<Result<std::unique_ptr<Trace
     return median(std::move(ms));
 }
 
-Result<std::unique_ptr<Tracer>> open_pack(const std::string& path)
+Result<std::unique_ptr<Tracer>> open_pack(const std::string& path, const MakeTracer& make)
 {
     const Result<std::shared_ptr<const Scene>> scene = load_scene(path);
     if (!scene.ok())
         return scene.error();
-    return make_cpu_tracer(*scene);
+    return make(*scene);
+}
+
+Result<std::unique_ptr<Tracer>> make_wide(const std::shared_ptr<const Scene>& scene)
+{
+    return make_cpu_tracer(scene);
 }
 
 Result<std::unique_ptr<Tracer>> open_mesh(const std::string& path)
@@ -92,32 +100,30 @@ public:
 
     void add_paper(Peers& peers) const
     {
-        const std::string pack = scratch_.file("paper.tray");
-        const Result<Json> report = run_converter(
-            model_, pack, {"--no-previews", "--surfaces", "bezier", "--leaf-budget", "1", "--trim-memory", "0"});
-        const auto scene = report.ok() ? load_scene(pack) : Result<std::shared_ptr<const Scene>>(report.error());
-        if (!scene.ok()) {
-            peers.notes.push_back("the paper's shape of tracer: " + scene.error().detail);
+        const Converted pack = convert("paper.tray", {"--trim-memory", "0"});
+        if (!pack.scene.ok()) {
+            peers.notes.push_back("the paper's shape of tracer: " + pack.scene.error().detail);
             return;
         }
-        note_losses("the paper's shape of tracer", *report, peers);
-        const Preparation preparation{seconds_of(*report), size_of_file(pack), {}, {}};
-        const uint64_t bytes = bytes_read(**scene, TrimMode::Kd);
+        note_losses("the paper's shape of tracer", *pack.report, peers);
+        const MakeTracer one_ray = [](const auto& scene) { return make_one_ray_tracer(scene); };
         add_framed({"the paper's shape: Bézier, one leaf a patch, kd-trees, one ray", "one-ray", TrimMode::Kd, 1},
-                   make_one_ray_tracer(*scene), bytes, preparation, peers);
-        add_framed({"the same, 16 rays wide", "wide", TrimMode::Kd, 1}, make_cpu_tracer(*scene), bytes, preparation,
-                   peers);
-        add_framed({"the same, 16 rays wide, 10 frames", "wide-10-frames", TrimMode::Kd, 10}, make_cpu_tracer(*scene),
-                   bytes, preparation, peers);
-        const Result<KdTrims>& kd = (*scene)->prepared->kd_trims();
-        if (!kd.ok())
-            return;
-        peers.paper = PaperCounts{(*report)["converted"].get<uint64_t>(), (*report)["pcurves"].get<uint64_t>(),
-                                  (*report)["patches"].get<uint64_t>(), (*report)["trim_pieces"].get<uint64_t>(),
-                                  bytes + kd->size_bytes()};
-        const auto textured = with_textures(**scene, {TrimSource::Mask, TrimLayout::Square}, double(kd->size_bytes()));
-        add_framed({"the same, 16 rays wide, the paper's textures (100 %)", "wide-textures", TrimMode::Sdf, 1},
-                   make_cpu_tracer(textured), bytes_read(*textured, TrimMode::Sdf), preparation, peers);
+                   one_ray, pack, peers);
+        add_framed({"the same, 16 rays wide", "wide", TrimMode::Kd, 1}, make_wide, pack, peers);
+        add_framed({"the same, 16 rays wide, 10 frames", "wide-10-frames", TrimMode::Kd, 10}, make_wide, pack, peers);
+        if (const Result<KdTrims>& kd = (*pack.scene)->prepared->kd_trims(); kd.ok()) {
+            const Json& report = *pack.report;
+            peers.paper = PaperCounts{report["converted"].get<uint64_t>(), report["pcurves"].get<uint64_t>(),
+                                      report["patches"].get<uint64_t>(), report["trim_pieces"].get<uint64_t>(),
+                                      bytes_read(**pack.scene, TrimMode::Kd) + kd->size_bytes()};
+        }
+        const char* textured_name = "the same, 16 rays wide, the paper's textures (100 %)";
+        const Converted textured =
+            convert("textured.tray", {"--trim-memory", "100%", "--trim-source", "mask", "--trim-layout", "square"});
+        if (textured.scene.ok())
+            add_framed({textured_name, "wide-textures", TrimMode::Sdf, 1}, make_wide, textured, peers);
+        else
+            peers.notes.push_back(fmt::format("{}: {}", textured_name, textured.scene.error().detail));
     }
 
     void add_mesh(double deflection, Peers& peers) const
@@ -126,8 +132,9 @@ public:
         const std::string file = scratch_.file(fmt::format("{:g}.trimesh", deflection));
         const Result<Json> report = run_converter(model_, file, {"--mesh", fmt::format("{:g}", deflection)});
         const auto opened = report.ok() ? open_mesh(file) : Result<std::unique_ptr<Tracer>>(report.error());
-        const Result<double> first = opened.ok() ? first_picture_ms([&] { return open_mesh(file); }, camera_, options_)
-                                                 : Result<double>(opened.error());
+        const Result<double> first =
+            opened.ok() ? first_picture_ms([&] { return open_mesh(file); }, ask_nothing, camera_, options_)
+                        : Result<double>(opened.error());
         if (!first.ok()) {
             peers.notes.push_back(name + ": " + first.error().detail);
             return;
@@ -143,26 +150,45 @@ public:
     }
 
 private:
+    /// The model as the paper has it: all Bezier patches, one leaf each.
+    struct Converted {
+        std::string file;
+        Result<Json> report;
+        Result<std::shared_ptr<const Scene>> scene;
+    };
+    Converted convert(const std::string& name, const std::vector<std::string>& trims) const
+    {
+        std::vector<std::string> options{"--no-previews", "--surfaces", "bezier", "--leaf-budget", "1"};
+        options.insert(options.end(), trims.begin(), trims.end());
+        const std::string file = scratch_.file(name);
+        Result<Json> report = run_converter(model_, file, options);
+        auto scene = report.ok() ? load_scene(file) : Result<std::shared_ptr<const Scene>>(report.error());
+        return {file, std::move(report), std::move(scene)};
+    }
+
     /// The paper's frames, by one of several tracers.
     struct Framed {
         const char *name, *paper; // as Contender's
         TrimMode trim;
         uint32_t frames;
     };
-    static void add_framed(const Framed& framed, Result<std::unique_ptr<Tracer>> tracer, uint64_t bytes,
-                           const Preparation& preparation, Peers& peers)
+    void add_framed(const Framed& framed, const MakeTracer& make, const Converted& pack, Peers& peers) const
     {
-        if (!tracer.ok()) {
-            peers.notes.push_back(fmt::format("{}: {}", framed.name, tracer.error().detail));
+        const Ask ask = [framed](RenderOptions& render) {
+            render.closest = ClosestPolicy::Stochastic;
+            render.trim = framed.trim;
+            render.frames = framed.frames;
+        };
+        Result<std::unique_ptr<Tracer>> tracer = make(*pack.scene);
+        const Result<double> first =
+            tracer.ok() ? first_picture_ms([&] { return open_pack(pack.file, make); }, ask, camera_, options_)
+                        : Result<double>(tracer.error());
+        if (!first.ok()) {
+            peers.notes.push_back(fmt::format("{}: {}", framed.name, first.error().detail));
             return;
         }
-        Contender contender{kDial, framed.name, std::move(*tracer), {}, bytes, framed.paper};
-        contender.ask = [trim = framed.trim, frames = framed.frames](RenderOptions& render) {
-            render.closest = ClosestPolicy::Stochastic;
-            render.trim = trim;
-            render.frames = frames;
-        };
-        add(peers, std::move(contender), preparation);
+        add(peers, {kDial, framed.name, std::move(*tracer), ask, bytes_read(**pack.scene, framed.trim), framed.paper},
+            {seconds_of(*pack.report), size_of_file(pack.file), *first, {}});
     }
 
     /// Faces that are missing; warnings are the own pack's too, which has noted them.
@@ -206,7 +232,8 @@ Result<Preparation> make_own_pack(const std::string& model, const std::string& p
     const Result<Camera> camera = bench_view("iso", *scene, options.width, options.height, options.magnification);
     if (!camera.ok())
         return camera.error();
-    const Result<double> first = first_picture_ms([&] { return open_pack(pack); }, *camera, options);
+    const Result<double> first =
+        first_picture_ms([&] { return open_pack(pack, make_wide); }, [](RenderOptions&) {}, *camera, options);
     if (!first.ok())
         return first.error();
     return Preparation{seconds_of(*report), size_of_file(pack), *first, {}};

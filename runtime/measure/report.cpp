@@ -136,7 +136,11 @@ Json to_json(const ReportedContender& contender)
 
 Json to_json(const ModelReport& model, const AccuracyOptions& options)
 {
-    Json object{{"model", model.name}, {"faces", model.faces}, {"instances", model.instances}, {"notes", model.notes}};
+    Json object{{"model", model.name},
+                {"faces", model.faces},
+                {"instances", model.instances},
+                {"pack_options", model.pack_options},
+                {"notes", model.notes}};
     if (const auto& paper = model.paper)
         object["paper"] = {{"nurbs_surfaces", paper->nurbs_surfaces},
                            {"nurbs_curves", paper->nurbs_curves},

@@ -21,6 +21,7 @@ struct ReportedContender {
 struct ModelReport {
     std::string name; // of the file, without its folder
     uint32_t faces = 0, instances = 0;
+    std::string pack_options;       // as the pack tells them
     std::vector<std::string> notes; // what was left out, and why
     std::vector<ReportedContender> contenders;
     std::vector<AccuracyView> views;
