@@ -96,7 +96,7 @@ TEST_F(error_pictures_of, the_map_tells_steps_of_depth_and_wrong_answers)
     frame_.depth_mm[middle_ + 1] -= float(2 * width_mm);
     frame_.depth_mm[middle_ + 2] = std::numeric_limits<float>::infinity();
     frame_.depth_mm[0] = 40; // the reference misses there
-    const Picture map = error_map(*reference_, frame_);
+    const Picture map = error_map(*reference_, frame_, kSide);
     EXPECT_EQ(at(map, middle_), of_step(1e-2));
     EXPECT_EQ(at(map, middle_ + 1), of_step(1));
     const std::array<uint8_t, 4> wrong{kWrongAnswer[0], kWrongAnswer[1], kWrongAnswer[2], 255};
@@ -104,6 +104,17 @@ TEST_F(error_pictures_of, the_map_tells_steps_of_depth_and_wrong_answers)
     EXPECT_EQ(at(map, 0), wrong);
     EXPECT_EQ(at(map, middle_ - 1), of_step(0));
     EXPECT_EQ(at(map, kSide - 1)[3], 0) << "both miss";
+}
+
+TEST_F(error_pictures_of, a_small_map_keeps_the_worst)
+{
+    frame_.depth_mm[middle_] += float(0.03 * reference_->footprint_mm(middle_));
+    const Picture map = error_map(*reference_, frame_, kSide / 2 - 1); // squares of three
+    EXPECT_EQ(map.width, (kSide + 2) / 3);
+    EXPECT_EQ(map.height, (kSide + 2) / 3);
+    const size_t at_middle = kSide / 2 / 3 * map.width + kSide / 2 / 3;
+    EXPECT_EQ(at(map, at_middle), of_step(1e-2));
+    EXPECT_EQ(at(map, at_middle - 1), of_step(0));
 }
 
 TEST_F(error_pictures_of, the_worst_place_is_cut_out_of_both_pictures)
@@ -118,7 +129,7 @@ TEST_F(error_pictures_of, the_worst_place_is_cut_out_of_both_pictures)
     for (size_t i = 0; i < seen->rgba.size(); ++i)
         differing += seen->rgba[i] != right->rgba[i];
     EXPECT_EQ(differing, 1u);
-    EXPECT_EQ(decode_png(pictures->map)->width, kSide);
+    EXPECT_EQ(decode_png(pictures->map)->width, kSide) << "no wider than 320 as it is";
     const Result<ErrorPictures> as_tie = error_pictures(*reference_, frame_, {middle_});
     EXPECT_EQ(as_tie->place.difference, 0u) << "a tie has the reference's colour";
 }

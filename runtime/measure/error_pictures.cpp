@@ -10,6 +10,7 @@ namespace trimray {
 namespace {
 
 constexpr uint32_t kCropSide = 64; // pixels
+constexpr uint32_t kMapWidth = 320;
 
 uint32_t square(int value)
 {
@@ -32,6 +33,19 @@ std::vector<uint64_t> sums_of_differences(const Picture& a, const Picture& b)
                 difference + sums[y * stride + x + 1] + sums[(y + 1) * stride + x] - sums[y * stride + x];
         }
     return sums;
+}
+
+/// 0 where both miss, else how many steps it reaches; one more than there are for a wrong answer.
+size_t badness(const ReferencePicture& reference, const Frame& frame, size_t i)
+{
+    const float depth = frame.depth_mm[i], right = reference.frame().depth_mm[i];
+    if (std::isfinite(depth) != std::isfinite(right))
+        return error_steps().size() + 1;
+    if (!std::isfinite(right))
+        return 0;
+    const double off_px = std::abs(double(depth) - double(right)) / reference.footprint_mm(i);
+    const auto reached = [off_px](const ErrorStep& step) { return off_px >= step.depth_px; };
+    return size_t(std::count_if(error_steps().begin(), error_steps().end(), reached));
 }
 
 Picture cut_out(const Picture& picture, const WorstPlace& place)
@@ -73,24 +87,25 @@ const std::vector<ErrorStep>& error_steps()
     return steps;
 }
 
-Picture error_map(const ReferencePicture& reference, const Frame& frame)
+Picture error_map(const ReferencePicture& reference, const Frame& frame, uint32_t widest)
 {
-    const Frame& right = reference.frame();
-    Picture map{right.width, right.height, std::vector<uint8_t>(4 * right.depth_mm.size(), 0)};
-    for (size_t i = 0; i < right.depth_mm.size(); ++i) {
-        const bool hit = std::isfinite(frame.depth_mm[i]), right_hit = std::isfinite(right.depth_mm[i]);
-        if (!hit && !right_hit)
-            continue;
-        std::array<uint8_t, 3> colour = kWrongAnswer;
-        if (hit && right_hit) {
-            const double off_px =
-                std::abs(double(frame.depth_mm[i]) - double(right.depth_mm[i])) / reference.footprint_mm(i);
-            for (const ErrorStep& step : error_steps())
-                if (off_px >= step.depth_px)
-                    colour = step.srgb;
+    const uint32_t width = frame.width, height = frame.height, side = (width + widest - 1) / widest;
+    Picture map{(width + side - 1) / side, (height + side - 1) / side, {}};
+    std::vector<size_t> worst(size_t{map.width} * map.height, 0);
+    for (uint32_t y = 0; y < height; ++y)
+        for (uint32_t x = 0; x < width; ++x) {
+            size_t& at = worst[size_t{y / side} * map.width + x / side];
+            at = std::max(at, badness(reference, frame, size_t{y} * width + x));
         }
-        std::copy(colour.begin(), colour.end(), &map.rgba[4 * i]);
-        map.rgba[4 * i + 3] = 255;
+    for (const size_t badness : worst) {
+        if (badness == 0) {
+            map.rgba.insert(map.rgba.end(), 4, 0);
+            continue;
+        }
+        const auto& steps = error_steps();
+        const std::array<uint8_t, 3>& colour = badness > steps.size() ? kWrongAnswer : steps[badness - 1].srgb;
+        map.rgba.insert(map.rgba.end(), colour.begin(), colour.end());
+        map.rgba.push_back(255);
     }
     return map;
 }
@@ -105,7 +120,7 @@ Result<ErrorPictures> error_pictures(const ReferencePicture& reference, const Fr
         return pictures;
     for (const auto& [picture, png] : {std::pair{cut_out(seen, pictures.place), &pictures.seen},
                                        std::pair{cut_out(reference.picture(), pictures.place), &pictures.right},
-                                       std::pair{error_map(reference, frame), &pictures.map}}) {
+                                       std::pair{error_map(reference, frame, kMapWidth), &pictures.map}}) {
         Result<std::vector<std::byte>> bytes = encode_png(picture, PngForm::Fewest);
         if (!bytes.ok())
             return bytes.error();

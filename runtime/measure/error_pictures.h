@@ -31,7 +31,8 @@ const std::vector<ErrorStep>& error_steps();
 /// Of pixels that hit where the reference misses, or the other way; those that both miss are clear.
 constexpr std::array<uint8_t, 3> kWrongAnswer{213, 94, 0};
 
-Picture error_map(const ReferencePicture& reference, const Frame& frame);
+/// At most `widest` pixels wide: each the worst of a square of the picture's.
+Picture error_map(const ReferencePicture& reference, const Frame& frame, uint32_t widest);
 
 struct ErrorPictures {
     WorstPlace place;

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <map>
 #include <span>
 #include <string_view>
 #include <thread>
@@ -164,11 +165,30 @@ Json to_json(const ModelReport& model, const AccuracyOptions& options)
     return object;
 }
 
-/// Each contender's pictures from the view where it is worst; null: its pictures are equal to the reference's, or it is
-/// a smooth one.
+/// Pictures by number: many contenders make the same.
+class PictureList {
+public:
+    size_t number_of(std::span<const std::byte> png)
+    {
+        std::string uri = data_uri(png);
+        const auto [found, is_new] = numbers_.try_emplace(uri, uris_.size());
+        if (is_new)
+            uris_.push_back(std::move(uri));
+        return found->second;
+    }
+    const Json& uris() const { return uris_; }
+
+private:
+    std::map<std::string, size_t> numbers_;
+    Json uris_ = Json::array();
+};
+
+/// Each contender's pictures from the view where it is worst, as numbers in `uris`; null: its pictures are equal to the
+/// reference's, or it is a smooth one.
 Json pictures_json(const AccuracyReport& report)
 {
     Json object{{"steps", Json::array()}, {"wrong", kWrongAnswer}, {"models", Json::array()}};
+    PictureList list;
     for (const ErrorStep& step : error_steps())
         object["steps"].push_back({{"depth_px", step.depth_px}, {"srgb", step.srgb}});
     for (const ModelReport& model : report.models) {
@@ -188,12 +208,13 @@ Json pictures_json(const AccuracyReport& report)
                                 {"y", pictures.place.y},
                                 {"width", pictures.place.width},
                                 {"height", pictures.place.height},
-                                {"seen", data_uri(pictures.seen)},
-                                {"right", data_uri(pictures.right)},
-                                {"map", data_uri(pictures.map)}});
+                                {"seen", list.number_of(pictures.seen)},
+                                {"right", list.number_of(pictures.right)},
+                                {"map", list.number_of(pictures.map)}});
         }
         object["models"].push_back(std::move(of_model));
     }
+    object["uris"] = list.uris();
     return object;
 }
 
