@@ -9,7 +9,6 @@
 
 #include <fmt/format.h>
 
-#include <numeric>
 #include <utility>
 
 namespace trimray {
@@ -27,29 +26,6 @@ std::shared_ptr<const Scene> scene_of(const std::shared_ptr<const Scene>& scene,
     if (setting.trims && setting.trims->has_textures())
         return with_textures(*scene, setting.trims->textures, setting.trims->memory * kd_bytes);
     return scene;
-}
-
-/// Of one picture, its frames together.
-double picture_ms(const RenderStats& stats)
-{
-    const std::vector<double>& ms = stats.frame_cpu_ms.empty() ? stats.frame_ms : stats.frame_cpu_ms;
-    return std::accumulate(ms.begin(), ms.end(), 0.0);
-}
-
-struct Made {
-    Frame frame;
-    RenderStats stats;
-};
-
-Result<Made> make_picture(const Contender& contender, RenderOptions render)
-{
-    contender.ask(render);
-    Made made;
-    Result<Frame> frame = contender.tracer->render(render, made.stats);
-    if (!frame.ok())
-        return Error{frame.error().code, frame.error().where, contender.name + ": " + frame.error().detail};
-    made.frame = std::move(*frame);
-    return made;
 }
 
 } // namespace
@@ -115,35 +91,20 @@ Result<AccuracyView> measure_view(const std::string& name, const std::shared_ptr
     if (!reference.ok())
         return reference.error();
 
-    const size_t count = contenders.size();
-    AccuracyView view{name, *camera, std::vector<AccuracyPoint>(count)};
-    for (uint32_t round = 0; round < options.rounds; ++round)
-        for (size_t turn = 0; turn < count; ++turn) {
-            const size_t i = round % 2 == 0 ? turn : count - 1 - turn;
-            AccuracyPoint& point = view.points[i];
-            if (round > 0 && point.picture_ms.front() > kLongPicture_ms)
-                continue;
-            progress(fmt::format("{}: round {} of {}: {}", name, round + 1, options.rounds, contenders[i].name));
-            Result<Made> made = make_picture(contenders[i], render);
-            if (!made.ok())
-                return made.error();
-            if (round == 0) {
-                point.errors = picture_errors(*reference, made->frame);
-                point.work = made->stats.work;
-                point.bytes = contenders[i].bytes + made->stats.buffer_bytes;
-            }
-            if (picture_ms(made->stats) <= kLongPicture_ms) {
-                made = make_picture(contenders[i], render);
-                if (!made.ok())
-                    return made.error();
-            }
-            point.picture_ms.push_back(picture_ms(made->stats));
-        }
-    for (AccuracyPoint& point : view.points) {
-        std::vector<double> ratios;
-        for (size_t round = 0; round < point.picture_ms.size(); ++round)
-            ratios.push_back(point.picture_ms[round] / view.points.front().picture_ms[round]);
-        point.time_to_default = median(std::move(ratios));
+    AccuracyView view{name, *camera, std::vector<AccuracyPoint>(contenders.size())};
+    const auto first = [&](size_t i, const Made& made) {
+        view.points[i].errors = picture_errors(*reference, made.frame);
+        view.points[i].work = made.stats.work;
+        view.points[i].bytes = contenders[i].bytes + made.stats.buffer_bytes;
+    };
+    Result<TurnTimes> times = time_in_turns(contenders, render, options.rounds, first, [&](const std::string& text) {
+        progress(fmt::format("{}: {}", name, text));
+    });
+    if (!times.ok())
+        return times.error();
+    for (size_t i = 0; i < contenders.size(); ++i) {
+        view.points[i].time_to_default = median(time_ratios((*times)[i], times->front()));
+        view.points[i].picture_ms = (*times)[i];
     }
     return view;
 }

@@ -1,6 +1,5 @@
 #include "runtime/measure/peers.h"
 
-#include "format/mesh_file.h"
 #include "runtime/bench_view.h"
 #include "runtime/cpu_view.h"
 #include "runtime/derived_scene.h"
@@ -69,14 +68,6 @@ Result<std::unique_ptr<Tracer>> open_pack(const std::string& path)
     if (!scene.ok())
         return scene.error();
     return make_cpu_tracer(*scene);
-}
-
-Result<std::unique_ptr<Tracer>> open_mesh(const std::string& path)
-{
-    Result<TriangleMesh> mesh = read_mesh(path);
-    if (!mesh.ok())
-        return mesh.error();
-    return make_mesh_tracer(std::move(*mesh));
 }
 
 /// The paper's own frame, its first.

@@ -1,10 +1,10 @@
 #include "runtime/measure/report.h"
 
+#include "runtime/measure/csv.h"
 #include "runtime/median.h"
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <thread>
@@ -36,14 +36,6 @@ const char* compiler()
 #else
     return "gcc " __VERSION__;
 #endif
-}
-
-/// Third quartile less first, over the median.
-double relative_spread(std::vector<double> values)
-{
-    std::sort(values.begin(), values.end());
-    const size_t quarter = values.size() / 4;
-    return (values[values.size() - 1 - quarter] - values[quarter]) / median(values);
 }
 
 Json number(double value) // JSON has no infinity: an equal picture has null decibels
@@ -129,15 +121,6 @@ Json to_json(const ModelReport& model, const AccuracyOptions& options)
     return object;
 }
 
-/// As RFC 4180 quotes a field.
-std::string quoted(const std::string& field)
-{
-    std::string out = "\"";
-    for (const char c : field)
-        out += c == '"' ? std::string("\"\"") : std::string(1, c);
-    return out + '"';
-}
-
 } // namespace
 
 double times_spread(const AccuracyReport& report)
@@ -195,8 +178,8 @@ std::string report_csv(const AccuracyReport& report)
     for (const ModelReport& model : report.models)
         for (const AccuracyView& view : model.views)
             for (size_t i = 0; i < view.points.size(); ++i) {
-                csv += fmt::format("{},{},{},{}", quoted(model.name), quoted(view.name),
-                                   quoted(model.contenders[i].dial), quoted(model.contenders[i].name));
+                csv += fmt::format("{},{},{},{}", csv_quoted(model.name), csv_quoted(view.name),
+                                   csv_quoted(model.contenders[i].dial), csv_quoted(model.contenders[i].name));
                 for (const auto& [name, value] : numbers(view.points[i], report.options))
                     csv += std::isfinite(value) ? fmt::format(",{}", value) : ",";
                 csv += '\n';
