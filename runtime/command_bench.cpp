@@ -515,7 +515,8 @@ void register_bench(CLI::App& app, int& exit_code)
 {
     CLI::App* bench = app.add_subcommand("bench", "Measure a part of the tracer on packs");
     bench->require_subcommand(1);
-    bench->footer("Examples:\n  trimray bench accuracy model.tray -o report\n  trimray bench trims model.tray\n  "
+    bench->footer("Examples:\n  trimray bench accuracy model.tray -o report\n  trimray bench speed model.tray\n  "
+                  "trimray bench trims model.tray\n  "
                   "trimray bench closest model.tray\n  "
                   "trimray bench effects model.tray\n  trimray bench moving model.tray\n\n'trimray bench "
                   "trims --help' describes the first.");
