@@ -208,6 +208,27 @@ Status write_table(const std::string& path, const SpeedTable& table)
     return write_file_atomically(path, {bytes.begin(), bytes.end()});
 }
 
+/// Measures all models, and prints each unless JSON is asked for. The exit code: that of the first that fails, which
+/// are reported, or kExitOk.
+int measure_models(const Arguments& arguments, std::vector<SpeedModel>& models)
+{
+    int exit_code = kExitOk;
+    for (const std::string& file : arguments.models) {
+        Result<SpeedModel> model = measure_speed(
+            file, arguments.options, [&](const std::string& text) { report_progress(name_of(file) + ": " + text); });
+        report_progress("");
+        if (!model.ok()) {
+            const int failed_code = report_error(model.error());
+            exit_code = exit_code == kExitOk ? failed_code : exit_code;
+            continue;
+        }
+        if (!arguments.json)
+            print_model(*model);
+        models.push_back(std::move(*model));
+    }
+    return exit_code;
+}
+
 int run(Arguments arguments)
 {
     SpeedOptions& options = arguments.options;
@@ -218,47 +239,32 @@ int run(Arguments arguments)
     options.height = size->height;
     if (const Status distinct = check_names(arguments); !distinct.ok())
         return report_error(distinct.error());
-    SpeedTable stored;
-    if (!arguments.baseline.empty()) {
-        Result<SpeedTable> read = read_baseline(arguments.baseline, options);
-        if (!read.ok())
-            return report_error(read.error());
-        stored = std::move(*read);
-    }
+    const bool compares = !arguments.baseline.empty(), writes = !arguments.write_baseline.empty();
+    const Result<SpeedTable> stored = compares ? read_baseline(arguments.baseline, options) : SpeedTable{};
+    if (!stored.ok())
+        return report_error(stored.error());
 
     std::vector<SpeedModel> models;
-    SpeedTable lines;
-    int exit_code = kExitOk; // of the first that fails; the others are measured
-    for (const std::string& file : arguments.models) {
-        Result<SpeedModel> model = measure_speed(
-            file, options, [&](const std::string& text) { report_progress(name_of(file) + ": " + text); });
-        report_progress("");
-        if (!model.ok()) {
-            const int failed_code = report_error(model.error());
-            exit_code = exit_code == kExitOk ? failed_code : exit_code;
-            continue;
-        }
-        if (!arguments.json)
-            print_model(*model);
-        lines.insert(lines.end(), model->lines.begin(), model->lines.end());
-        models.push_back(std::move(*model));
-    }
+    const int exit_code = measure_models(arguments, models);
     if (models.empty())
         return exit_code;
+    SpeedTable lines;
+    for (const SpeedModel& model : models)
+        lines.insert(lines.end(), model.lines.begin(), model.lines.end());
     warn_when_busy(lines);
     std::optional<SpeedComparison> comparison;
-    if (!arguments.baseline.empty())
-        comparison = compare_speeds(stored, lines);
+    if (compares)
+        comparison = compare_speeds(*stored, lines);
     if (arguments.json)
         print_json(run_json(arguments, models, comparison));
     else if (comparison)
         print_comparison(*comparison, arguments.baseline);
     if (exit_code != kExitOk) {
-        if (!arguments.write_baseline.empty())
+        if (writes)
             report_note(arguments.write_baseline + " is not written, for not all models were measured");
         return exit_code;
     }
-    if (!arguments.write_baseline.empty())
+    if (writes)
         if (const Status written = write_table(arguments.write_baseline, lines); !written.ok())
             return report_error(written.error());
     return arguments.check && !comparison->agrees() ? int{kExitPartial} : exit_code;

@@ -29,8 +29,8 @@ struct SpeedModel {
 
 /// `model`: a pack, or a CAD file, which is converted. Baselines are the paper's shape of tracer (one ray at a time,
 /// one leaf a patch of the same pack, kd-trees), and, of a CAD file, its triangles at kSpeedDeflection traced by
-/// Embree; one that cannot be made is noted. Times are taken in turns (turns.h). Fails: as run_converter, load_scene,
-/// bench_view, make_cpu_tracer.
+/// Embree; triangles that cannot be made are noted. Times are taken in turns (turns.h). Fails: as run_converter,
+/// load_scene, bench_view, make_cpu_tracer, derive_kd.
 Result<SpeedModel> measure_speed(const std::string& model, const SpeedOptions& options,
                                  const std::function<void(const std::string&)>& progress);
 constexpr double kSpeedDeflection = 1e-4; // of the model's diagonal

@@ -8,7 +8,6 @@
 #include <array>
 #include <charconv>
 #include <cmath>
-#include <set>
 
 namespace trimray {
 namespace {
@@ -122,7 +121,7 @@ void compare_speed(const SpeedLine& stored, const SpeedLine& now, const char* ba
     ChangedSpeed changed{now.model, now.view, baseline, *was, *is, 0, SpeedVerdict::Open};
     if (stored.times.*spread && now.times.*spread) {
         changed.noise = *(stored.times.*spread) + *(now.times.*spread);
-        const double change = *is / *was - 1;
+        const double change = std::log(*is / *was); // as far for half as for twice the speed
         changed.verdict = std::abs(change) <= changed.noise ? SpeedVerdict::Same
                           : change > 0                      ? SpeedVerdict::Faster
                                                             : SpeedVerdict::Slower;
