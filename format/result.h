@@ -36,6 +36,7 @@ enum class ErrorCode : int {
     InvalidTrim = 321,
     InvalidScene = 330,
     InvalidMesh = 340,
+    InvalidBaseline = 350, // a stored run of `bench speed`
     UnsupportedFormat = 400,
     UnsupportedSurface = 401,
     UnsupportedPackFeature = 402,

@@ -14,7 +14,6 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
-#include <unistd.h>
 
 namespace trimray {
 namespace {
@@ -233,19 +232,6 @@ void print_effects(const std::string& pack, const EffectsReport& report)
     fmt::print("\n");
 }
 
-/// What is being done, on a terminal only.
-void show_progress(const std::string& pack, const std::string& text)
-{
-    if (isatty(STDERR_FILENO) != 0)
-        fmt::print(stderr, "\r\033[K{}: {}", printable(pack), text);
-}
-
-void end_progress()
-{
-    if (isatty(STDERR_FILENO) != 0)
-        fmt::print(stderr, "\r\033[K");
-}
-
 /// Benches one pack after the other; `take` gets each report. The exit code: that of the first pack that failed, which
 /// is reported, or kExitOk.
 template <class Bench, class Take>
@@ -255,8 +241,8 @@ int bench_each(const std::vector<std::string>& packs, Bench bench, Take take)
         const Result<std::shared_ptr<const Scene>> scene = load_scene(pack);
         if (!scene.ok())
             return report_error(scene.error());
-        const auto report = bench(*scene, [&](const std::string& text) { show_progress(pack, text); });
-        end_progress();
+        const auto report = bench(*scene, [&](const std::string& text) { report_progress(pack + ": " + text); });
+        report_progress("");
         if (!report.ok())
             return report_error(report.error());
         take(pack, *report);
@@ -529,7 +515,8 @@ void register_bench(CLI::App& app, int& exit_code)
 {
     CLI::App* bench = app.add_subcommand("bench", "Measure a part of the tracer on packs");
     bench->require_subcommand(1);
-    bench->footer("Examples:\n  trimray bench accuracy model.tray -o report\n  trimray bench trims model.tray\n  "
+    bench->footer("Examples:\n  trimray bench accuracy model.tray -o report\n  trimray bench speed model.tray\n  "
+                  "trimray bench trims model.tray\n  "
                   "trimray bench closest model.tray\n  "
                   "trimray bench effects model.tray\n  trimray bench moving model.tray\n\n'trimray bench "
                   "trims --help' describes the first.");

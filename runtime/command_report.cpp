@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <cstdio>
+#include <unistd.h>
 
 namespace trimray {
 
@@ -29,6 +30,12 @@ int report_error(const Error& error)
 void report_note(std::string_view text)
 {
     fmt::print(stderr, "trimray: {}\n", printable(text));
+}
+
+void report_progress(std::string_view text)
+{
+    if (isatty(STDERR_FILENO) != 0)
+        fmt::print(stderr, "\r\033[K{}", printable(text));
 }
 
 } // namespace trimray

@@ -19,4 +19,7 @@ int report_error(const Error& error);
 /// Prints `trimray: <text>` on stderr: what was chosen and why, never an error.
 void report_note(std::string_view text);
 
+/// Shows what is being done in place of what was shown before, where stderr is a terminal; "" removes it.
+void report_progress(std::string_view text);
+
 } // namespace trimray

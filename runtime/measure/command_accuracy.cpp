@@ -17,7 +17,6 @@
 #include <span>
 #include <string>
 #include <system_error>
-#include <unistd.h>
 #include <vector>
 
 namespace trimray {
@@ -44,18 +43,12 @@ constexpr const char* kFooter =
     "  trimray bench accuracy part.tray board.tray -o report --quick --size 320x180\n"
     "\nWrites report.html, report.json and report.csv.";
 
-void show_progress(const std::string& text)
-{
-    if (isatty(STDERR_FILENO) != 0)
-        fmt::print(stderr, "\r\033[K{}", printable(text));
-}
-
 /// `model`: a pack, or a CAD file, which has peers.
 Result<ModelReport> measure_model(const std::string& model, const AccuracyOptions& options, std::string& device)
 {
     ModelReport report;
     report.name = fs::path(model).filename().string();
-    const auto progress = [&](const std::string& text) { show_progress(report.name + ": " + text); };
+    const auto progress = [&](const std::string& text) { report_progress(report.name + ": " + text); };
     const Result<ScratchFolder> scratch = ScratchFolder::make();
     if (!scratch.ok())
         return scratch.error();
@@ -149,7 +142,7 @@ int run(Arguments arguments, const std::string& command)
     int exit_code = kExitOk; // of the first that fails; the others are measured
     for (const std::string& file : arguments.models) {
         Result<ModelReport> model = measure_model(file, options, report.device);
-        show_progress("");
+        report_progress("");
         if (!model.ok()) {
             const int failed_code = report_error(model.error());
             exit_code = exit_code == kExitOk ? failed_code : exit_code;

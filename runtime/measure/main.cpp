@@ -1,4 +1,4 @@
-// trimray-measure: `trimray bench accuracy` runs it, as `trimray-measure accuracy`.
+// trimray-measure: `trimray bench accuracy` and `bench speed` run it, as `trimray-measure accuracy` and `... speed`.
 #include "runtime/command_report.h"
 #include "runtime/measure/commands.h"
 
@@ -39,6 +39,7 @@ int main(int argc, char** argv)
     app.require_subcommand(1);
     int exit_code = kExitOk;
     register_accuracy(app, command_line(argc, argv), exit_code);
+    register_speed(app, exit_code);
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {

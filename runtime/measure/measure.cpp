@@ -12,7 +12,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <numeric>
 #include <utility>
 
 namespace trimray {
@@ -30,29 +29,6 @@ std::shared_ptr<const Scene> scene_of(const std::shared_ptr<const Scene>& scene,
     if (setting.trims && setting.trims->has_textures())
         return with_textures(*scene, setting.trims->textures, setting.trims->memory * kd_bytes);
     return scene;
-}
-
-/// Of one picture, its frames together.
-double picture_ms(const RenderStats& stats)
-{
-    const std::vector<double>& ms = stats.frame_cpu_ms.empty() ? stats.frame_ms : stats.frame_cpu_ms;
-    return std::accumulate(ms.begin(), ms.end(), 0.0);
-}
-
-struct Made {
-    Frame frame;
-    RenderStats stats;
-};
-
-Result<Made> make_picture(const Contender& contender, RenderOptions render)
-{
-    contender.ask(render);
-    Made made;
-    Result<Frame> frame = trace_picture(*contender.tracer, render, contender.samples, made.stats);
-    if (!frame.ok())
-        return Error{frame.error().code, frame.error().where, contender.name + ": " + frame.error().detail};
-    made.frame = std::move(*frame);
-    return made;
 }
 
 /// What the smooth contenders are held against, over white; empty where there are none.
@@ -157,37 +133,20 @@ Result<AccuracyView> measure_view(const std::string& name, const std::shared_ptr
     if (!smooth.ok())
         return smooth.error();
 
-    const size_t count = contenders.size();
-    AccuracyView view{name, *camera, std::vector<AccuracyPoint>(count)};
-    for (uint32_t round = 0; round < options.rounds; ++round)
-        for (size_t turn = 0; turn < count; ++turn) {
-            const size_t i = round % 2 == 0 ? turn : count - 1 - turn;
-            AccuracyPoint& point = view.points[i];
-            if (round > 0 && point.picture_ms.front() > kLongPicture_ms)
-                continue;
-            progress(fmt::format("{}: round {} of {}: {}", name, round + 1, options.rounds, contenders[i].name));
-            Result<Made> made = make_picture(contenders[i], render);
-            if (!made.ok())
-                return made.error();
-            if (round == 0) {
-                if (const Status held = hold_against(*reference, *smooth, contenders[i].smooth, made->frame, point);
-                    !held.ok())
-                    return held.error();
-                point.work = made->stats.work;
-                point.bytes = contenders[i].bytes + made->stats.buffer_bytes;
-            }
-            if (picture_ms(made->stats) <= kLongPicture_ms) {
-                made = make_picture(contenders[i], render);
-                if (!made.ok())
-                    return made.error();
-            }
-            point.picture_ms.push_back(picture_ms(made->stats));
-        }
-    for (AccuracyPoint& point : view.points) {
-        std::vector<double> ratios;
-        for (size_t round = 0; round < point.picture_ms.size(); ++round)
-            ratios.push_back(point.picture_ms[round] / view.points.front().picture_ms[round]);
-        point.time_to_default = median(std::move(ratios));
+    AccuracyView view{name, *camera, std::vector<AccuracyPoint>(contenders.size())};
+    const auto first = [&](size_t i, const Made& made) {
+        view.points[i].work = made.stats.work;
+        view.points[i].bytes = contenders[i].bytes + made.stats.buffer_bytes;
+        return hold_against(*reference, *smooth, contenders[i].smooth, made.frame, view.points[i]);
+    };
+    Result<TurnTimes> times = time_in_turns(contenders, render, options.rounds, first, [&](const std::string& text) {
+        progress(fmt::format("{}: {}", name, text));
+    });
+    if (!times.ok())
+        return times.error();
+    for (size_t i = 0; i < contenders.size(); ++i) {
+        view.points[i].time_to_default = median(time_ratios((*times)[i], times->front()));
+        view.points[i].picture_ms = (*times)[i];
     }
     return view;
 }

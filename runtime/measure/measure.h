@@ -6,6 +6,7 @@
 #include "runtime/measure/error_pictures.h"
 #include "runtime/measure/picture_errors.h"
 #include "runtime/measure/settings.h"
+#include "runtime/measure/turns.h"
 #include "runtime/tracer.h"
 
 #include <cstdint>
@@ -16,35 +17,17 @@
 
 namespace trimray {
 
-/// What makes pictures: a tracer, what is asked of it, and what it reads.
-struct Contender {
-    std::string dial, name; // as AccuracySetting's; peers have the dial "peers"
-    std::shared_ptr<Tracer> tracer;
-    std::function<void(RenderOptions&)> ask;
-    uint64_t bytes = 0; // of the arrays that it reads beside those that RenderStats counts
-    // Whose part it has in the paper's tables (REPORT.md): "one-ray", "wide", "wide-10-frames", "wide-textures" or
-    // "textures-50" (percent); empty: none
-    std::string paper;
-    uint32_t samples = 1; // a pixel, squared
-    // Held against the smooth picture (kSmoothSamples), by its colours alone, not against the reference in double,
-    // which has one sample a pixel
-    bool smooth = false;
-};
-
 /// What pictures with smoothed borders are held against: the default's with so many samples a pixel, squared.
 constexpr uint32_t kSmoothSamples = 6;
 
 struct AccuracyPoint {
-    // Of a whole picture, all its frames together; on the CPU with one thread processor time. One a round; what takes
-    // more than kLongPicture_ms is timed once
-    std::vector<double> picture_ms;
-    double time_to_default = 0; // median over the rounds of its time over the default's in the same round
-    WorkCounts work;            // of one frame
-    uint64_t bytes = 0;         // the contender's, and those of the picture (RenderStats)
-    PictureErrors errors;       // of a smooth contender: PSNR and SSIM alone
-    ErrorPictures pictures;     // empty where colours are equal, and of a smooth contender
+    std::vector<double> picture_ms; // as TurnTimes
+    double time_to_default = 0;     // median over the rounds of its time over the default's in the same round
+    WorkCounts work;                // of one frame
+    uint64_t bytes = 0;             // the contender's, and those of the picture (RenderStats)
+    PictureErrors errors;           // of a smooth contender: PSNR and SSIM alone
+    ErrorPictures pictures;         // empty where colours are equal, and of a smooth contender
 };
-constexpr double kLongPicture_ms = 1000;
 
 struct AccuracyView {
     std::string name;
@@ -71,10 +54,8 @@ uint64_t bytes_read(const Scene& scene, TrimMode trim);
 Result<std::vector<Contender>> make_contenders(const std::shared_ptr<const Scene>& scene,
                                                const AccuracyOptions& options, std::string& note);
 
-/// A round makes every picture once, in order and the next round backwards, so that a slow drift of the machine falls
-/// on all alike; each is made twice in a row and timed the second time, with the caches as a viewer has them. Errors
-/// are those of the first round's. `progress` is told what is being done. Fails: as Tracer::render, bench_view. Domain:
-/// contenders[0] is the default.
+/// Times are taken in turns (turns.h); errors are those of the first round's. `progress` is told what is being done.
+/// Fails: as Tracer::render, bench_view. Domain: contenders[0] is the default.
 Result<AccuracyView> measure_view(const std::string& name, const std::shared_ptr<const Scene>& scene,
                                   const std::vector<Contender>& contenders, const AccuracyOptions& options,
                                   const std::function<void(const std::string&)>& progress);

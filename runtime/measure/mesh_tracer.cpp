@@ -304,4 +304,12 @@ Result<std::unique_ptr<Tracer>> make_mesh_tracer(TriangleMesh mesh)
     return std::unique_ptr<Tracer>(std::move(tracer));
 }
 
+Result<std::unique_ptr<Tracer>> open_mesh(const std::string& path)
+{
+    Result<TriangleMesh> mesh = read_mesh(path);
+    if (!mesh.ok())
+        return mesh.error();
+    return make_mesh_tracer(std::move(*mesh));
+}
+
 } // namespace trimray

@@ -7,6 +7,7 @@
 #include "runtime/tracer.h"
 
 #include <memory>
+#include <string>
 
 namespace trimray {
 
@@ -17,5 +18,8 @@ namespace trimray {
 /// reference's (make_reference_tracer). The same bits on any number of threads; Embree's own arithmetic differs between
 /// instruction sets. Fails: InvalidMesh (no triangles), DeviceFailed (Embree's words).
 Result<std::unique_ptr<Tracer>> make_mesh_tracer(TriangleMesh mesh);
+
+/// Of the mesh in a file. Fails: as read_mesh and make_mesh_tracer.
+Result<std::unique_ptr<Tracer>> open_mesh(const std::string& path);
 
 } // namespace trimray

@@ -1,6 +1,5 @@
 #include "runtime/measure/peers.h"
 
-#include "format/mesh_file.h"
 #include "runtime/bench_view.h"
 #include "runtime/cpu_view.h"
 #include "runtime/measure/mesh_tracer.h"
@@ -79,14 +78,6 @@ Result<std::unique_ptr<Tracer>> make_wide(const std::shared_ptr<const Scene>& sc
     return make_cpu_tracer(scene);
 }
 
-Result<std::unique_ptr<Tracer>> open_mesh(const std::string& path)
-{
-    Result<TriangleMesh> mesh = read_mesh(path);
-    if (!mesh.ok())
-        return mesh.error();
-    return make_mesh_tracer(std::move(*mesh));
-}
-
 /// What is asked of a mesh: nothing, for it has neither trims nor leaves.
 void ask_nothing(RenderOptions&) {}
 
@@ -146,7 +137,7 @@ public:
         std::error_code ignored;
         fs::remove(file, ignored); // fine meshes are large
         if (tracer.ok())
-            add(peers, {kDial, name, std::move(*tracer), ask_nothing, 0, ""}, preparation);
+            add(peers, {kDial, name, std::move(*tracer), ask_nothing}, preparation);
     }
 
 private:

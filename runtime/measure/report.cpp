@@ -1,10 +1,10 @@
 #include "runtime/measure/report.h"
 
+#include "runtime/measure/csv.h"
 #include "runtime/median.h"
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <map>
@@ -39,14 +39,6 @@ const char* compiler()
 #else
     return "gcc " __VERSION__;
 #endif
-}
-
-/// Third quartile less first, over the median.
-double relative_spread(std::vector<double> values)
-{
-    std::sort(values.begin(), values.end());
-    const size_t quarter = values.size() / 4;
-    return (values[values.size() - 1 - quarter] - values[quarter]) / median(values);
 }
 
 Json number(double value) // JSON has no infinity: an equal picture has null decibels
@@ -227,15 +219,6 @@ void fill_in(std::string_view place, const Json& json, std::string& page)
     page.replace(page.find(place), place.size(), text);
 }
 
-/// As RFC 4180 quotes a field.
-std::string quoted(const std::string& field)
-{
-    std::string out = "\"";
-    for (const char c : field)
-        out += c == '"' ? std::string("\"\"") : std::string(1, c);
-    return out + '"';
-}
-
 } // namespace
 
 double times_spread(const AccuracyReport& report)
@@ -292,8 +275,8 @@ std::string report_csv(const AccuracyReport& report)
     for (const ModelReport& model : report.models)
         for (const AccuracyView& view : model.views)
             for (size_t i = 0; i < view.points.size(); ++i) {
-                csv += fmt::format("{},{},{},{}", quoted(model.name), quoted(view.name),
-                                   quoted(model.contenders[i].dial), quoted(model.contenders[i].name));
+                csv += fmt::format("{},{},{},{}", csv_quoted(model.name), csv_quoted(view.name),
+                                   csv_quoted(model.contenders[i].dial), csv_quoted(model.contenders[i].name));
                 const auto row = numbers(view.points[i], report.options, model.contenders[i].smooth);
                 for (const auto& [name, value] : row)
                     csv += std::isfinite(value) ? fmt::format(",{}", value) : ",";
