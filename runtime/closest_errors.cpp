@@ -10,16 +10,7 @@
 namespace trimray {
 namespace {
 
-using reference::length;
-using reference::operator*;
-using reference::operator+;
-
 constexpr double kHairPx = 1e-3;
-
-reference::Ray pixel_ray(const CameraRays& rays, uint32_t x, uint32_t y)
-{
-    return {rays.eye, rays.corner + rays.step_x * (x + 0.5) + rays.step_y * (y + 0.5)};
-}
 
 } // namespace
 
@@ -39,7 +30,8 @@ Result<ReferencePicture> ReferencePicture::make(std::shared_ptr<const Scene> sce
 
 ReferencePicture::ReferencePicture(std::shared_ptr<const Scene> scene, const RenderOptions& options, Frame frame)
     : scene_(std::move(scene)), closest_(scene_->pack.image),
-      rays_(camera_rays(options.camera, options.width, options.height)), width_(options.width), height_(options.height),
+      steps_(camera_rays(options.camera, options.width, options.height)),
+      rays_(options.camera, options.width, options.height), width_(options.width), height_(options.height),
       frame_(std::move(frame)), picture_(over_white(frame_)), asked_(frame_.depth_mm.size(), Asked::No)
 {
 }
@@ -47,17 +39,15 @@ ReferencePicture::ReferencePicture(std::shared_ptr<const Scene> scene, const Ren
 double ReferencePicture::footprint_mm(size_t i) const
 {
     const auto x = uint32_t(i % width_), y = uint32_t(i / width_);
-    const double angle =
-        std::max(length(rays_.step_x), length(rays_.step_y)) / length(pixel_ray(rays_, x, y).direction);
-    return double(frame_.depth_mm[i]) * angle;
+    return rays_.footprint_mm(x + 0.5, y + 0.5, double(frame_.depth_mm[i]));
 }
 
 bool ReferencePicture::is_tangent(uint32_t x, uint32_t y)
 {
     Asked& asked = asked_[size_t{y} * width_ + x];
     if (asked == Asked::No) {
-        const reference::Ray ray = pixel_ray(rays_, x, y);
-        const Doubt doubt = closest_.hair(ray, closest_.closest(ray), rays_.step_x, rays_.step_y, kHairPx).doubt;
+        const reference::Ray ray = rays_.through(x + 0.5, y + 0.5);
+        const Doubt doubt = closest_.hair(ray, closest_.closest(ray), steps_.step_x, steps_.step_y, kHairPx).doubt;
         asked = doubt == Doubt::Tangent ? Asked::Tangent : Asked::Sure;
     }
     return asked == Asked::Tangent;

@@ -3,8 +3,8 @@
 #pragma once
 
 #include "format/closest_reference.h"
-#include "runtime/camera.h"
 #include "runtime/image_io.h"
+#include "runtime/pixel_rays.h"
 #include "runtime/tracer.h"
 
 #include <cstdint>
@@ -55,7 +55,8 @@ private:
     enum class Asked : uint8_t { No, Sure, Tangent };
     std::shared_ptr<const Scene> scene_; // before what refers to it
     ClosestReference closest_;
-    CameraRays rays_;
+    CameraRays steps_; // from pixel to pixel
+    PixelRays rays_;
     uint32_t width_, height_;
     Frame frame_;
     Picture picture_; // over white

@@ -1,3 +1,4 @@
+#include "runtime/command_budget.h"
 #include "runtime/command_draw.h"
 #include "runtime/command_json.h"
 #include "runtime/command_report.h"
@@ -15,7 +16,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 #include <memory>
+#include <optional>
 #include <unistd.h>
 #include <utility>
 #include <vector>
@@ -29,6 +33,7 @@ struct RenderArguments {
     DrawArguments draw;
     uint32_t frames = 1, threads = 0;
     double error_px = RenderOptions{}.error_px;
+    double time_budget_ms = std::numeric_limits<double>::infinity(); // of a frame
     bool json = false, explain = false;
 };
 
@@ -42,6 +47,7 @@ struct PictureJob {
 struct PictureReport {
     std::string file, camera;
     RenderStats stats;
+    std::optional<BudgetReport> budget;
 };
 
 /// Faults of the arguments that need no file to be seen.
@@ -60,6 +66,9 @@ Status check(const RenderArguments& arguments)
     if (!(arguments.error_px > 0 && arguments.error_px <= 1))
         return Error{ErrorCode::Usage, "--error-px",
                      fmt::format("expected a part of a pixel in (0, 1], found {}", arguments.error_px)};
+    if (!(arguments.time_budget_ms > 0))
+        return Error{ErrorCode::Usage, "--time-budget",
+                     fmt::format("expected milliseconds a frame, above 0, found {}", arguments.time_budget_ms)};
     return Done{};
 }
 
@@ -194,19 +203,24 @@ Json report_json(const RenderArguments& arguments, PictureSize size, const PackI
     if (!several) {
         report["uncertified_pixels"] = stats.work.uncertified_pixels;
         report["work"] = work_json(options, stats.work);
+        if (pictures.front().budget)
+            report["time_budget"] = to_json(*pictures.front().budget);
     }
     if (arguments.explain)
         report["plan"] = plan_json(plan);
     if (!several)
         return report;
     report["pictures"] = Json::array();
-    for (const PictureReport& picture : pictures)
-        report["pictures"].push_back({{"file", picture.file},
-                                      {"camera", picture.camera},
-                                      {"ms_per_frame", times_json(picture.stats)},
-                                      {"rays_per_second", rays_per_second(picture.stats)},
-                                      {"uncertified_pixels", picture.stats.work.uncertified_pixels},
-                                      {"work", work_json(options, picture.stats.work)}});
+    for (const PictureReport& picture : pictures) {
+        Json& one = report["pictures"].emplace_back(Json{{"file", picture.file},
+                                                         {"camera", picture.camera},
+                                                         {"ms_per_frame", times_json(picture.stats)},
+                                                         {"rays_per_second", rays_per_second(picture.stats)},
+                                                         {"uncertified_pixels", picture.stats.work.uncertified_pixels},
+                                                         {"work", work_json(options, picture.stats.work)}});
+        if (picture.budget)
+            one["time_budget"] = to_json(*picture.budget);
+    }
     return report;
 }
 
@@ -237,16 +251,17 @@ private:
     bool terminal_ = isatty(STDERR_FILENO) != 0;
 };
 
-/// Traces and writes one picture. Fails: as Tracer::render, write_image.
-Status make_picture(Tracer& tracer, const RenderOptions& options, uint32_t samples, const std::string& file,
-                    RenderStats& stats)
+/// Traces and writes one picture, within a budget if there is one. Fails: as Tracer::render, write_image.
+Status make_picture(Tracer& tracer, const RenderOptions& options, uint32_t samples,
+                    std::optional<BudgetedPictures>& budgeted, PictureReport& picture)
 {
-    Result<Frame> frame = trace_picture(tracer, options, samples, stats);
+    Result<Frame> frame = budgeted ? budgeted->trace(options, picture.stats, picture.budget.emplace())
+                                   : trace_picture(tracer, options, samples, picture.stats);
     if (!frame.ok())
         return frame.error();
     if (options.look.background)
         composite_over(*frame, *options.look.background);
-    return write_image(file, *frame);
+    return write_image(picture.file, *frame);
 }
 
 int run_render(const RenderArguments& arguments)
@@ -299,15 +314,21 @@ int run_render(const RenderArguments& arguments)
         return kExitOk;
     }
     Progress progress(jobs->size(), arguments.device == "reference");
+    std::optional<BudgetedPictures> budgeted;
+    if (std::isfinite(arguments.time_budget_ms))
+        budgeted.emplace(**tracer, *options, samples, !arguments.output.ends_with(".exr"), arguments.time_budget_ms);
     std::vector<PictureReport> pictures;
     for (const PictureJob& job : *jobs) {
         progress.begin(pictures.size(), *options);
         options->camera = job.from;
-        PictureReport& picture = pictures.emplace_back(PictureReport{job.file, job.camera, {}});
-        if (const Status made = make_picture(**tracer, *options, samples, job.file, picture.stats); !made.ok()) {
+        PictureReport& picture = pictures.emplace_back(PictureReport{job.file, job.camera, {}, {}});
+        const Status made = make_picture(**tracer, *options, samples, budgeted, picture);
+        if (!made.ok() || picture.budget)
             progress.clear();
+        if (!made.ok())
             return report_error(made.error());
-        }
+        if (picture.budget)
+            report_note((jobs->size() > 1 ? picture.file + ": " : "") + to_text(*picture.budget));
     }
     progress.clear();
     if (arguments.json)
@@ -346,6 +367,12 @@ void register_render(CLI::App& app, int& exit_code)
         ->check(CLI::Range(1u, 1000000u));
     command->add_option("--error-px", a->error_px, "Where Newton's iteration may stop, in pixels")
         ->capture_default_str();
+    command->add_option(
+        "--time-budget", a->time_budget_ms,
+        "Milliseconds that a frame may take, about (a tenth over fits). What does not fit is given up, the least "
+        "missed first, and named: samples a pixel, rays of occlusion and to lights, soft shadows, reflections, "
+        "smoothed "
+        "trims, occlusion, at last size (traced at 1/2 to 1/8 and enlarged) [no limit]");
     command->add_option("--threads", a->threads, "CPU threads; 0: all cores")
         ->capture_default_str()
         ->check(CLI::Range(0u, 1024u));
@@ -375,6 +402,7 @@ void register_render(CLI::App& app, int& exit_code)
         "  trimray render model.tray -o turn_%03d.png --turntable 36\n"
         "  trimray render model.tray --explain --edges sharp --trim sdf\n"
         "  trimray render model.tray -o picture.png --closest stochastic --frames 10\n"
+        "  trimray render model.tray -o picture.png --samples 4 --shadows soft --occlusion 64 --time-budget 250\n"
         "  trimray render model.tray -o picture.png --device cpu --frames 20 --json");
     command->callback([a, &exit_code] { exit_code = run_render(*a); });
 }

@@ -176,12 +176,17 @@ double diagonal_mm(const PackImage& image)
     return std::sqrt(square);
 }
 
-Result<Frame> trace_picture(Tracer& tracer, RenderOptions options, uint32_t samples, RenderStats& stats)
+RenderOptions at_samples(RenderOptions options, uint32_t samples)
 {
     options.width *= samples;
     options.height *= samples;
     options.edge_width_px *= static_cast<float>(samples);
-    Result<Frame> frame = tracer.render(options, stats);
+    return options;
+}
+
+Result<Frame> trace_picture(Tracer& tracer, const RenderOptions& options, uint32_t samples, RenderStats& stats)
+{
+    Result<Frame> frame = tracer.render(at_samples(options, samples), stats);
     if (!frame.ok() || samples == 1)
         return frame;
     return average_samples(*frame, samples);

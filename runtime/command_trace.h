@@ -56,8 +56,11 @@ Reach model_reach(const PackImage& image);
 /// Of the model's bounds.
 double diagonal_mm(const PackImage& image);
 
+/// What is traced for a picture of samples x samples a pixel.
+RenderOptions at_samples(RenderOptions options, uint32_t samples);
+
 /// Traces at samples x samples the resolution and averages (colours only, when samples > 1). The counts in `stats` are
 /// of all samples. Fails: as Tracer::render.
-Result<Frame> trace_picture(Tracer& tracer, RenderOptions options, uint32_t samples, RenderStats& stats);
+Result<Frame> trace_picture(Tracer& tracer, const RenderOptions& options, uint32_t samples, RenderStats& stats);
 
 } // namespace trimray

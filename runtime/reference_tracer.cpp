@@ -5,6 +5,7 @@
 #include "runtime/frame_effects.h"
 #include "runtime/frame_size.h"
 #include "runtime/image_io.h"
+#include "runtime/pixel_rays.h"
 #include "runtime/tracer.h"
 
 #include <algorithm>
@@ -26,7 +27,6 @@ using reference::dot;
 using reference::length;
 using reference::Vec3;
 using reference::operator*;
-using reference::operator+;
 
 constexpr uint32_t kLookDone = kLookOrthographic; // LookBit
 constexpr uint kDefaultColor = 0xffb4b0acu;       // of what has none, sRGB
@@ -92,21 +92,13 @@ public:
 private:
     void trace(const RenderOptions& options, WorkCounts& work, Frame& frame) const
     {
-        const bool parallel = options.camera.orthographic_mm > 0;
-        const CameraRays from_eye = camera_rays(options.camera, options.width, options.height);
-        const ParallelRays side_by_side = parallel_rays(options.camera, options.width, options.height);
-        const auto ray_at = [&](double x, double y) -> reference::Ray {
-            if (parallel)
-                return {side_by_side.corner + side_by_side.step_x * x + side_by_side.step_y * y,
-                        side_by_side.direction};
-            return {from_eye.eye, from_eye.corner + from_eye.step_x * x + from_eye.step_y * y};
-        };
+        const PixelRays rays(options.camera, options.width, options.height);
         std::atomic<uint64_t> patches{0}, uncertified{0};
         std::mutex telling;
         uint32_t rows_done = 0;
         tbb::parallel_for(0u, options.height, [&](uint32_t y) {
             for (uint32_t x = 0; x < options.width; ++x) {
-                const reference::Ray ray = ray_at(x + 0.5, y + 0.5);
+                const reference::Ray ray = rays.through(x + 0.5, y + 0.5);
                 const ReferenceHit hit = closest_.closest(ray);
                 write(options, ray, hit, size_t(y) * options.width + x, frame);
                 patches.fetch_add(hit.patches, std::memory_order_relaxed);

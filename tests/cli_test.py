@@ -446,6 +446,61 @@ class Render(CliTest):
         self.fails(1, "render", PACK, "-o", WORK / "g.png", "--view", "top", "--eye", "1,2,3", says=["--eye"])
         self.fails(1, "render", PACK, "-o", WORK / "g.png", "--trim", "exakt", says=["did you mean 'exact'?"])
 
+    def test_a_time_budget_that_holds_all_changes_nothing(self):
+        asked = ["--size", "64x48", "--samples", 2, "--occlusion", 8, "--shadows", "soft", "--background", "white"]
+        without = self.render("without.png", *asked).read_bytes()
+        out = WORK / "within.png"
+        done = self.ok("render", PACK, "-o", out, "--device", "cpu", *asked, "--time-budget", "1e9", "--json")
+        self.assertEqual(out.read_bytes(), without)
+        report = json.loads(done.stdout)
+        self.assertEqual(list(report), self.KEYS + ["time_budget"])
+        budget = report["time_budget"]
+        self.assertEqual(list(budget), ["ms", "measured_ms", "fits", "gave_up"])
+        self.assertEqual((budget["ms"], budget["fits"], budget["gave_up"]), (1e9, True, []))
+        self.assertGreaterEqual(budget["measured_ms"], report["ms_per_frame"]["median"])
+        self.assertRegex(done.stderr, r"^trimray: --time-budget 1e\+09: .* ms a frame; gave up nothing\n$")
+
+    def test_a_time_budget_that_nothing_fits_gives_up_everything_and_says_so(self):
+        out, whole = WORK / "hasty.png", WORK / "whole.png"
+        asked = ["--size", "150x101", "--device", "cpu", "--samples", 3, "--occlusion", 8, "--shadows", "soft",
+                 "--antialias", "trims"]
+        done = self.ok("render", PACK, "-o", out, *asked, "--time-budget", "1e-6", "--json")
+        budget = json.loads(done.stdout)["time_budget"]
+        self.assertFalse(budget["fits"])
+        self.assertGreater(budget["measured_ms"], 1e-6)
+        self.assertEqual([list(one) for one in budget["gave_up"]], [["what", "from", "to"]] * 5)
+        self.assertEqual([tuple(one.values()) for one in budget["gave_up"]],
+                         [("samples a pixel", "3 x 3", "1 x 1"), ("rays of occlusion", "8", "0"),
+                          ("shadows", "soft, 16 rays a light", "hard"), ("smoothed trims", "yes", "no"),
+                          ("size traced", "full", "1/6")])
+        self.assertIn("over the budget", done.stderr)
+        for one in budget["gave_up"]:
+            self.assertIn(f"{one['what']} {one['from']} -> {one['to']}", done.stderr)
+        self.ok("render", PACK, "-o", whole, *asked)
+        (width, height, hasty), (_, _, right) = read_png(out), read_png(whole)
+        self.assertEqual((width, height), (150, 101), "enlarged to the size that was asked for")
+        for pixel in (hasty[0][3], hasty[-1][-1]):
+            self.assertEqual(pixel, 0, "what is transparent stays so")
+        middles = []  # of what is seen: nothing has moved by half a traced pixel, 3 of these
+        for rows in (hasty, right):
+            weights = [(x, y, row[4 * x + 3]) for y, row in enumerate(rows) for x in range(width)]
+            total = sum(w for _, _, w in weights)
+            middles.append([sum(place[axis] * place[2] for place in weights) / total for axis in (0, 1)])
+        for a, b in zip(*middles):
+            self.assertAlmostEqual(a, b, delta=1.5)
+
+    def test_each_picture_has_its_time_budget(self):
+        report = self.json_of("render", PACK, "-o", WORK / "budgeted_%d.exr", "--size", "64x48", "--device", "cpu",
+                              "--turntable", 2, "--time-budget", "1e-6", "--json")
+        self.assertNotIn("time_budget", report)
+        for number, picture in enumerate(report["pictures"], 1):
+            self.assertEqual(picture["time_budget"]["gave_up"], [{"what": "size traced", "from": "full", "to": "1/3"}])
+            self.assertTrue((WORK / f"budgeted_{number}.exr").exists())
+
+    def test_wrong_time_budgets_are_usage_errors(self):
+        for value in ["0", "-5", "nan", "soon", ""]:
+            self.fails(1, "render", PACK, "-o", WORK / "g.png", "--time-budget", value, says=["--time-budget"])
+
     def test_a_picture_that_cannot_be_written_is_named(self):
         target = WORK / "no_such_folder" / "h.png"
         self.fails(2, "render", PACK, "-o", target, "--size", "8x8", "--device", "cpu", says=[str(target)])
