@@ -60,7 +60,7 @@ bool ReferencePicture::is_tie(size_t i, const Frame& frame) const
     const PackImage& image = scene_->pack.image;
     if (size_t(frame.instance[i]) >= image.instances.size() || size_t(frame.face[i]) >= image.faces.size())
         return false; // a picture of something else than the pack
-    const reference::Ray ray = pixel_ray(rays_, uint32_t(i % width_), uint32_t(i / width_));
+    const reference::Ray ray = rays_.through(double(i % width_) + 0.5, double(i / width_) + 0.5);
     const ReferenceHit other = closest_.closest_of(ray, uint(frame.instance[i]), uint(frame.face[i]));
     return other.hit && std::abs(other.distance_mm - double(frame_.depth_mm[i])) <= kHairPx * footprint_mm(i);
 }
