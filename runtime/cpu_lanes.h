@@ -59,17 +59,36 @@ struct FreeMiddles {
     std::vector<uint32_t> leaf; // whose; ~0: none
 };
 
+/// Where 16 candidates are on the picture. Places without one have an x0 that no pixel meets.
+struct RectGroup {
+    float x0[16], x1[16], y0[16], y1[16];
+};
+struct CandidateGroup {
+    RectGroup rect;
+    struct Strips {
+        float nx[16], ny[16], lo[16], hi[16]; // PixelStrip, wider: a packet meets it where its middle lies in it
+    } strip[2];
+    float near_mm[16];
+    uint32_t index[16]; // of the block's candidates
+};
+
+/// What candidates are sorted by, and which of them it is.
+struct CandidateKey {
+    float near_mm;
+    uint32_t instance, leaf, at;
+};
+
 /// What a block's tracing reads and writes; one a thread, reused.
 struct BlockScratch {
-    CandidateScratch walk;
-    std::vector<Candidate> candidates;
+    std::vector<uint32_t> stack; // of nodes
+    std::vector<Candidate> unsorted, candidates;
+    std::vector<CandidateKey> keys;
     std::vector<PatchView> patch_views; // by candidate
     std::vector<uint8_t> has_view;
     std::vector<LeafMiddle> leaf_middles; // by candidate
     std::vector<uint8_t> has_middle;
-    // a tile's candidates, each array padded to whole packets
-    std::vector<float> x0, x1, y0, y1, near_mm;
-    std::vector<uint32_t> index;
+    std::vector<RectGroup> rects;            // of the candidates, in their order
+    std::vector<CandidateGroup> tile_groups; // a tile's candidates, in their order
     Strip strip;
     std::vector<TrimQueries> trim_queries; // of all blocks so far, where the job records them
     FreeMiddles free_middles;              // where a picture needs such rays

@@ -9,6 +9,7 @@
 #define TRIMRAY_CPU_PACKET_H
 #endif
 
+#include "runtime/cpu_candidates.h"
 #include "runtime/cpu_caps.h"
 #include "runtime/cpu_edges.h"
 #include "runtime/cpu_fetch.h"
@@ -55,7 +56,8 @@ public:
     HWY_ATTR void trace(const Block& block)
     {
         const float middle_x = 0.5f * float(job_.width), middle_y = 0.5f * float(job_.height);
-        collect_candidates(job_.scene, job_.view, pixel_rect(block), scratch_.walk, scratch_.candidates, work_);
+        collect_candidates(job_.scene, job_.view, pixel_rect(block), scratch_, work_);
+        list_rects();
         scratch_.has_view.assign(scratch_.candidates.size(), 0);
         scratch_.patch_views.resize(std::max(scratch_.patch_views.size(), scratch_.candidates.size()));
         scratch_.has_middle.assign(scratch_.candidates.size(), 0);
@@ -75,7 +77,7 @@ public:
             const uint32_t strip_y0 = draws_lines ? block.y0 : ty;
             for (uint32_t tx = block.x0; tx < block.x1; tx += kTileSide) {
                 const Block tile{tx, ty, std::min(tx + kTileSide, block.x1), tile_y1};
-                choose_candidates(pixel_rect(tile));
+                choose_candidates(centre_rect(tile));
                 for (uint32_t y = tile.y0; y < tile.y1; y += 4) {
                     for (uint32_t x = tile.x0; x < tile.x1; x += 4) {
                         Packet packet;
@@ -87,7 +89,7 @@ public:
                                 span_ = caps_->span(packet);
                         packet.begin = span_.begin;
                         kept_ = keeps ? &job_.stochastic->kept->of_packet(x, y) : nullptr;
-                        const PixelRect rect = pixel_rect({x, y, x + 4, y + 4});
+                        const PixelRect rect = centre_rect({x, y, x + 4, y + 4});
                         PacketHit hit = trace_twice(packet, rect);
                         if (keeps)
                             keep_nearer(hit, packet.alive, *kept_);
@@ -115,30 +117,80 @@ private:
         return {float(block.x0) - x, float(block.x1) - x, float(block.y0) - y, float(block.y1) - y};
     }
 
-    /// Copies the candidates that meet the tile into the scratch's arrays.
-    void choose_candidates(const PixelRect& rect)
+    /// Where the centres of the block's pixels lie, and so its rays.
+    PixelRect centre_rect(const Block& block) const
+    {
+        const PixelRect rect = pixel_rect(block);
+        return {rect.x0 + 0.5f, rect.x1 - 0.5f, rect.y0 + 0.5f, rect.y1 - 0.5f};
+    }
+
+    static HWY_ATTR mask meets(const RectGroup& group, const PixelRect& rect)
+    {
+        return load(group.x0) <= rect.x1 && load(group.x1) >= rect.x0 && load(group.y0) <= rect.y1 &&
+               load(group.y1) >= rect.y0;
+    }
+
+    static HWY_ATTR mask meets(const CandidateGroup& group, const PixelRect& rect)
+    {
+        mask met = meets(group.rect, rect);
+        const real x(0.5f * (rect.x0 + rect.x1)), y(0.5f * (rect.y0 + rect.y1));
+        for (const CandidateGroup::Strips& strip : group.strip) {
+            const real at = x * load(strip.nx) + y * load(strip.ny);
+            met = met && at >= load(strip.lo) && at <= load(strip.hi);
+        }
+        return met;
+    }
+
+    /// Lists where all candidates are, as the scratch's rects.
+    void list_rects()
     {
         const std::vector<Candidate>& all = scratch_.candidates;
-        BlockScratch& s = scratch_;
-        if (s.x0.size() < all.size() + kLanes)
-            for (std::vector<float>* v : {&s.x0, &s.x1, &s.y0, &s.y1, &s.near_mm})
-                v->resize(all.size() + kLanes);
-        s.index.resize(std::max(s.index.size(), all.size() + kLanes));
+        rect_groups_ = (all.size() + kLanes - 1) / kLanes;
+        scratch_.rects.resize(std::max(scratch_.rects.size(), rect_groups_));
+        for (size_t i = 0; i < rect_groups_ * kLanes; ++i) {
+            constexpr PixelRect kNowhere{std::numeric_limits<float>::infinity(), 0, 0, 0};
+            const PixelRect& rect = i < all.size() ? all[i].rect : kNowhere;
+            RectGroup& group = scratch_.rects[i / kLanes];
+            group.x0[i % kLanes] = rect.x0;
+            group.x1[i % kLanes] = rect.x1;
+            group.y0[i % kLanes] = rect.y0;
+            group.y1[i % kLanes] = rect.y1;
+        }
+    }
+
+    /// Lists the candidates that meet the tile as the scratch's groups.
+    HWY_ATTR void choose_candidates(const PixelRect& rect)
+    {
         tile_count_ = 0;
-        for (size_t i = 0; i < all.size(); ++i) {
-            const Candidate& c = all[i];
-            s.x0[tile_count_] = c.rect.x0;
-            s.x1[tile_count_] = c.rect.x1;
-            s.y0[tile_count_] = c.rect.y0;
-            s.y1[tile_count_] = c.rect.y1;
-            s.near_mm[tile_count_] = c.near_mm;
-            s.index[tile_count_] = uint32_t(i);
-            tile_count_ += c.rect.x0 <= rect.x1 && c.rect.x1 >= rect.x0 && c.rect.y0 <= rect.y1 && c.rect.y1 >= rect.y0;
+        for (size_t first = 0; first < rect_groups_; ++first)
+            for (uint bits = lane_bits(meets(scratch_.rects[first], rect)); bits != 0; bits &= bits - 1)
+                list_candidate(uint32_t(first * kLanes) + uint32_t(__builtin_ctz(bits)));
+        for (size_t i = tile_count_; i % kLanes != 0; ++i)
+            scratch_.tile_groups[i / kLanes].rect.x0[i % kLanes] = std::numeric_limits<float>::infinity();
+    }
+
+    void list_candidate(uint32_t index)
+    {
+        const size_t at = tile_count_ % kLanes;
+        if (scratch_.tile_groups.size() * kLanes <= tile_count_)
+            scratch_.tile_groups.resize(2 * scratch_.tile_groups.size() + 1);
+        CandidateGroup& group = scratch_.tile_groups[tile_count_++ / kLanes];
+        const Candidate& c = scratch_.candidates[index];
+        group.rect.x0[at] = c.rect.x0;
+        group.rect.x1[at] = c.rect.x1;
+        group.rect.y0[at] = c.rect.y0;
+        group.rect.y1[at] = c.rect.y1;
+        for (int i = 0; i < 2; ++i) {
+            const PixelStrip& strip = c.strip[i];
+            CandidateGroup::Strips& strips = group.strip[i];
+            const float reach = 1.5f * (std::abs(strip.nx) + std::abs(strip.ny)); // from a packet's middle to its rays
+            strips.nx[at] = strip.nx;
+            strips.ny[at] = strip.ny;
+            strips.lo[at] = strip.lo - reach;
+            strips.hi[at] = strip.hi + reach;
         }
-        for (size_t i = tile_count_; i < tile_count_ + kLanes; ++i) {
-            s.x0[i] = std::numeric_limits<float>::infinity(); // meets no packet
-            s.x1[i] = s.y0[i] = s.y1[i] = s.near_mm[i] = 0;
-        }
+        group.near_mm[at] = c.near_mm;
+        group.index[at] = index;
     }
 
     /// Puts the packet's pixels at (x, y) of the strip. A cap hides the hit behind it.
@@ -245,15 +297,14 @@ private:
         }
         recent_.clear();
         for (size_t first = 0; first < tile_count_; first += kLanes) {
-            if (scratch_.near_mm[first] > farthest)
+            const CandidateGroup& group = scratch_.tile_groups[first / kLanes];
+            if (group.near_mm[0] > farthest)
                 break;
-            const mask meets = load(&scratch_.x0[first]) <= rect.x1 && load(&scratch_.x1[first]) >= rect.x0 &&
-                               load(&scratch_.y0[first]) <= rect.y1 && load(&scratch_.y1[first]) >= rect.y0;
-            for (uint bits = lane_bits(meets); bits != 0; bits &= bits - 1) {
-                const size_t i = first + size_t(__builtin_ctz(bits));
-                if (scratch_.near_mm[i] > farthest)
+            for (uint bits = lane_bits(meets(group, rect)); bits != 0; bits &= bits - 1) {
+                const int i = __builtin_ctz(bits);
+                if (group.near_mm[i] > farthest)
                     break;
-                if (intersect(packet, scratch_.index[i], hit))
+                if (intersect(packet, group.index[i], hit))
                     farthest = largest_lane(hit.best);
             }
         }
@@ -296,7 +347,7 @@ private:
     std::optional<PacketLight> light_;
     std::optional<CapFinder> caps_;
     CutSpan span_; // of the packet at hand where kSpans; else it begins at the eye
-    size_t tile_count_ = 0;
+    size_t rect_groups_ = 0, tile_count_ = 0;
     RecentPatches recent_;
     KeptPacket* kept_ = nullptr; // of the packet at hand, where hits are kept from frame to frame
 };

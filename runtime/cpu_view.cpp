@@ -101,76 +101,6 @@ void finish_view(const PackImage& image, View& view)
         view.instances.push_back(view_from(instance, image.parts[instance.part], view));
 }
 
-/// A point set center + sum of +-half_axis[i], seen: the centre's and the axes' (tau, tau x, tau y).
-struct SeenBox {
-    double center[3], axis[3][3];
-};
-
-/// A frustum of a rectangle in one instance's part: points p with f . (p - eye) >= 0 for all f.
-struct Frustum {
-    double eye[3];
-    double plane[5][3], reach[5][3]; // tau > 0 and the rectangle's four sides; |plane|
-
-    Frustum(const InstanceView& view, const PixelRect& rect)
-    {
-        for (int i = 0; i < 3; ++i) {
-            eye[i] = view.eye[i];
-            plane[0][i] = view.row_tau[i];
-            plane[1][i] = view.row_x[i] - rect.x0 * view.row_tau[i];
-            plane[2][i] = rect.x1 * view.row_tau[i] - view.row_x[i];
-            plane[3][i] = view.row_y[i] - rect.y0 * view.row_tau[i];
-            plane[4][i] = rect.y1 * view.row_tau[i] - view.row_y[i];
-        }
-        for (int f = 0; f < 5; ++f)
-            for (int i = 0; i < 3; ++i)
-                reach[f][i] = std::abs(plane[f][i]);
-    }
-
-    bool meets(const double center[3], const double half[3]) const
-    {
-        for (int f = 0; f < 5; ++f) {
-            const double most = dot(plane[f], center) + dot(reach[f], half);
-            if (!(most >= 0))
-                return false;
-        }
-        return true;
-    }
-};
-
-/// Calls leaf(index) for each leaf of the tree whose box meets the frustum.
-template <class Leaf>
-void walk(const BvhNode* nodes, const Frustum& frustum, std::vector<uint32_t>& stack, WorkCounts& work, Leaf leaf)
-{
-    const size_t bottom = stack.size();
-    stack.push_back(0);
-    while (stack.size() > bottom) {
-        const BvhNode& node = nodes[stack.back()];
-        stack.pop_back();
-        ++work.node_visits;
-        double step[3], origin[3];
-        for (int c = 0; c < 3; ++c) {
-            step[c] = std::ldexp(0.5, int(node.exponents >> 8 * c & 0xffu) - 127); // half a step: centre and half side
-            origin[c] = double(node.origin[c]) - frustum.eye[c];
-        }
-        for (int i = 0; i < 4; ++i) {
-            if (node.child[i] == kBvhEmpty)
-                continue;
-            double center[3], half[3];
-            for (int c = 0; c < 3; ++c) {
-                const int lo = int(node.lo[c] >> 8 * i & 0xffu), hi = int(node.hi[c] >> 8 * i & 0xffu);
-                center[c] = origin[c] + step[c] * (lo + hi);
-                half[c] = step[c] * (hi - lo);
-            }
-            if (!frustum.meets(center, half))
-                continue;
-            if ((node.child[i] & kBvhLeaf) != 0)
-                leaf(node.child[i] & ~kBvhLeaf);
-            else
-                stack.push_back(node.child[i]);
-        }
-    }
-}
-
 /// The box that the children of the part's root fill.
 CpuScene::PartBox part_box(const PackImage& image, const PartRecord& part)
 {
@@ -192,47 +122,6 @@ CpuScene::PartBox part_box(const PackImage& image, const PartRecord& part)
     for (uint f = part.first_face; f < part.first_face + part.face_count; ++f)
         box.has_rims = box.has_rims || (image.faces[f].flags & kFaceRims) != 0;
     return box;
-}
-
-/// Where a leaf's box appears on the picture; false: not within the rectangle.
-bool project_box(const CpuScene::LeafBounds& box, const InstanceView& view, const PixelRect& rect, const View& picture,
-                 Candidate& out)
-{
-    const double c[3] = {box.center[0] - view.eye[0], box.center[1] - view.eye[1], box.center[2] - view.eye[2]};
-    const double tau = dot(view.row_tau, c), x = dot(view.row_x, c), y = dot(view.row_y, c);
-    double tau_a[3], x_a[3], y_a[3], reach = 0;
-    for (int i = 0; i < 3; ++i) {
-        const double a[3] = {box.half_axis[i][0], box.half_axis[i][1], box.half_axis[i][2]};
-        tau_a[i] = dot(view.row_tau, a);
-        x_a[i] = dot(view.row_x, a);
-        y_a[i] = dot(view.row_y, a);
-        reach += std::abs(tau_a[i]);
-    }
-    // the centre is rounded to 2^-24 of the part
-    reach = reach * (1 + 1e-7) + 1e-7 + view.far_slack;
-    if (tau + reach <= 0)
-        return false;
-    out.near_mm =
-        float((std::max(tau - reach, 0.0) / view.k - picture.tau_ref) - 1e-7 * (tau / view.k - picture.plane_mm));
-    out.rect = rect;
-    // a box around the eye's plane may be anywhere; one well before it is the hull of its corners
-    if (!(tau - reach > 1e-3 * reach))
-        return true;
-    double x0 = 1e30, x1 = -1e30, y0 = 1e30, y1 = -1e30;
-    for (int corner = 0; corner < 8; ++corner) {
-        const double a = corner & 1 ? 1 : -1, b = corner & 2 ? 1 : -1, d = corner & 4 ? 1 : -1;
-        const double per_tau = 1 / (tau + a * tau_a[0] + b * tau_a[1] + d * tau_a[2]);
-        const double px = (x + a * x_a[0] + b * x_a[1] + d * x_a[2]) * per_tau;
-        const double py = (y + a * y_a[0] + b * y_a[1] + d * y_a[2]) * per_tau;
-        x0 = std::min(x0, px);
-        x1 = std::max(x1, px);
-        y0 = std::min(y0, py);
-        y1 = std::max(y1, py);
-    }
-    constexpr double kPad = 0.01; // pixels: rounding of the rectangle to float, and of the box's centre
-    const double pad = kPad + 1e-6 * (x1 - x0 + y1 - y0);
-    out.rect = {float(x0 - pad), float(x1 + pad), float(y0 - pad), float(y1 + pad)};
-    return out.rect.x0 <= rect.x1 && out.rect.x1 >= rect.x0 && out.rect.y0 <= rect.y1 && out.rect.y1 >= rect.y0;
 }
 
 } // namespace
@@ -351,37 +240,6 @@ InstanceView world_view(const PackImage& image, const View& view)
         unit.origin_mm[i] = image.world_origin_mm[i];
     unit.scale_mm = image.world_scale_mm;
     return view_from(world, unit, view);
-}
-
-void collect_candidates(const CpuScene& scene, const View& view, const PixelRect& rect, CandidateScratch& scratch,
-                        std::vector<Candidate>& out, WorkCounts& work)
-{
-    const PackImage& image = scene.image;
-    out.clear();
-    scratch.stack.clear();
-    const auto enter = [&](uint32_t index) {
-        const InstanceView& instance = view.instances[index];
-        const PartRecord& part = image.parts[image.instances[index].part];
-        if (part.node_count == 0)
-            return;
-        walk(image.part_nodes.data() + part.first_node, Frustum(instance, rect), scratch.stack, work, [&](uint leaf) {
-            Candidate candidate;
-            candidate.leaf = part.first_leaf + leaf;
-            candidate.instance = index;
-            if (project_box(scene.leaf_bounds[candidate.leaf], instance, rect, view, candidate))
-                out.push_back(candidate);
-        });
-    };
-    if (view.alone || image.instances.size() == 1) {
-        enter(view.alone.value_or(0));
-    } else if (!image.top_nodes.empty()) {
-        walk(image.top_nodes.data(), Frustum(world_view(image, view), rect), scratch.stack, work, enter);
-    }
-    std::sort(out.begin(), out.end(), [](const Candidate& a, const Candidate& b) {
-        if (a.near_mm != b.near_mm)
-            return a.near_mm < b.near_mm;
-        return a.instance != b.instance ? a.instance < b.instance : a.leaf < b.leaf;
-    });
 }
 
 PatchView make_patch_view(const PatchRecord& patch, const InstanceView& instance, double tau_ref)

@@ -98,19 +98,19 @@ struct PatchView {
     float pixel;                       // a pixel's width where tau is 1
 };
 
+/// A strip of the picture, in pixels from its centre: lo <= nx x + ny y <= hi. The larger of |nx| and |ny| is 1.
+struct PixelStrip {
+    float nx, ny, lo, hi;
+};
+constexpr PixelStrip kWholePicture{0, 0, -1, 1};
+
 /// A leaf that rays of a block may meet, nearest first.
 struct Candidate {
-    PixelRect rect; // of its box on the picture
-    float near_mm;  // least tau - tau_ref of its box
+    PixelRect rect;      // of its box on the picture
+    PixelStrip strip[2]; // along the two sides of its box that are the longest there: they fit what lies askew
+    float near_mm;       // least tau - tau_ref of its box
     uint32_t leaf, instance;
 };
-
-/// The leaves whose boxes meet the rectangle's rays, sorted by near_mm. Reuses `out` and `stack`.
-struct CandidateScratch {
-    std::vector<uint32_t> stack;
-};
-void collect_candidates(const CpuScene& scene, const View& view, const PixelRect& rect, CandidateScratch& scratch,
-                        std::vector<Candidate>& out, WorkCounts& work);
 
 PatchView make_patch_view(const PatchRecord& patch, const InstanceView& instance, double tau_ref);
 

@@ -464,6 +464,37 @@ TEST(cpu_tracer, patches_that_share_their_borders_leave_no_hole)
     }
 }
 
+TEST(cpu_tracer, few_rays_ask_a_leaf_that_lies_askew)
+{
+    TracedScene model;
+    model.add(kKindPlane, 1, {0, 0, 0}, {1, 0.005});
+    const double h = std::sqrt(0.5);
+    model.place({h, -h, 0, 0, h, h, 0, 0, 0, 0, 1, 0});
+    const Drawn drawn = render(model.finish(), looking({0, 0.01, 40}, {0, 0, 0}, 30), 400, 400);
+    const size_t hits = hits_of(drawn.frame);
+    EXPECT_GT(hits, 400u);
+    // packets of 4 x 4 along its 4 or so pixels of width; in the square around it there are 100 times as many
+    EXPECT_LT(drawn.stats.work.leaf_visits, 10 * hits);
+}
+
+TEST(cpu_tracer, no_leaf_is_lost_where_a_pixel_is_a_millionth_of_the_part)
+{
+    const double c = std::cos(0.37), s = std::sin(0.37);
+    TracedScene model = patch_grid(0, 7);
+    model.place({c, -s, 0, 0, s, c, 0, 0, 0, 0, 1, 0});
+    const auto scene = model.finish();
+    for (const double column : {-3.0, 1.0, 5.0}) {
+        const double x = column * 10 / 6, y = 10.0 / 6; // four leaves meet there
+        const Point corner{c * x - s * y, s * x + c * y, 0};
+        for (const double height : {12.0, 0.1, 0.01}) {
+            const Point eye{corner[0] + 0.1 * height, corner[1] + 0.2 * height, height};
+            const double fov_deg = 180 / 3.14159265358979 * 300 * 1e-5 / height; // 300 pixels of 1e-5 mm
+            EXPECT_EQ(hits_of(render(scene, looking(eye, corner, fov_deg), 400, 300).frame), 400u * 300u)
+                << column << ' ' << height;
+        }
+    }
+}
+
 TEST(cpu_tracer, one_ray_meets_what_its_pixel_shows)
 {
     const auto scene = all_kinds().finish();
