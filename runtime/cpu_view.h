@@ -1,5 +1,5 @@
-// A picture's rays as the CPU tracer takes them, and which leaves they can meet. Everything here is double and the same
-// for all rays of a block of pixels; the lanes (cpu_lanes.h) take over with what it prepares.
+// A picture's rays as the CPU tracer takes them. Everything here is double and the same for all rays of a block of
+// pixels; the lanes (cpu_lanes.h) take over with what it prepares, and find the leaves that the rays can meet.
 //
 // A pixel at (x, y) from the picture's centre looks along w = w0 + x step_x + y step_y; a point of its ray is eye + tau
 // w. Affine maps keep tau, so it compares across parts; in the world |w0| = 1 and tau is in mm. In a part, w0 and the
