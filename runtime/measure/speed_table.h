@@ -14,7 +14,7 @@
 
 namespace trimray {
 
-/// What is the same on every machine, for any instruction set and number of threads.
+/// What is the same for any instruction set and number of threads.
 struct SpeedCounts {
     using Count = std::optional<uint64_t>; // none: not counted
     Count width, height;
