@@ -79,7 +79,7 @@ Frame shifted(const Judged& view, double by_px)
 
 TEST(error_promise, a_picture_moved_by_part_of_a_pixel_keeps_that_part_and_no_less)
 {
-    const Judged view(scene_of_test_model("nozzle.stp"), 32, 24);
+    const Judged view(scene_of_test_model("nozzle.stp"), 24, 18);
     const Frame moved = shifted(view, 0.3);
     const PromiseKept wide = view.judge(moved, 0.3);
     EXPECT_EQ(wide.broken.size(), 0u);
@@ -110,7 +110,7 @@ TEST(error_promise, a_hit_out_of_thin_air_and_a_depth_that_is_no_number_break_it
 
 TEST(error_promise, is_broken_by_one_start_in_one_leaf_a_patch)
 {
-    Judged view(with_leaf_budget(*scene_of_test_model("nozzle.stp"), 1), 64, 36);
+    Judged view(with_leaf_budget(*scene_of_test_model("nozzle.stp"), 1), 48, 27);
     view.options.closest = ClosestPolicy::Stochastic;
     EXPECT_GT(view.judge(draw(view.scene, view.options).frame, 0.02).broken.size(), 0u);
 }
@@ -119,7 +119,7 @@ TEST(error_promise, is_broken_by_textures_that_are_too_small)
 {
     constexpr double kBytes = 500;
     const auto scene = scene_of_test_model("io1-cm-214.stp");
-    Judged view(with_textures(*scene, {.source = TrimSource::Mask, .layout = TrimLayout::Square}, kBytes), 160, 90);
+    Judged view(with_textures(*scene, {.source = TrimSource::Mask, .layout = TrimLayout::Square}, kBytes), 64, 36);
     view.options.trim = TrimMode::Sdf;
     EXPECT_GT(view.judge(draw(view.scene, view.options).frame, 0.02).broken.size(), 0u);
 }
