@@ -1,6 +1,6 @@
 #include "runtime/error_promise.h"
 
-#include "runtime/pixel_rays.h"
+#include "runtime/reference_rays.h"
 
 #include <algorithm>
 #include <cmath>
@@ -37,7 +37,7 @@ struct Claim {
 /// The reference around one pixel's middle.
 class Surroundings {
 public:
-    Surroundings(const ClosestReference& closest, const PixelRays& rays, uint32_t x, uint32_t y)
+    Surroundings(const ClosestReference& closest, const ReferenceRays& rays, uint32_t x, uint32_t y)
         : closest_(closest), rays_(rays), x_(x + 0.5), y_(y + 0.5)
     {
     }
@@ -104,7 +104,7 @@ private:
     }
 
     const ClosestReference& closest_;
-    const PixelRays& rays_;
+    const ReferenceRays& rays_;
     double x_, y_;
 };
 
@@ -124,7 +124,7 @@ const BrokenPixel* PromiseKept::worst() const
 PromiseKept hold_to_promise(const Frame& traced, const Frame& right, const Camera& camera,
                             const ClosestReference& closest, double error_px)
 {
-    const PixelRays rays(camera, traced.width, traced.height);
+    const ReferenceRays rays(camera, traced.width, traced.height);
     std::vector<PromiseKept> rows(traced.height);
     tbb::parallel_for(0u, traced.height, [&](uint32_t y) {
         PromiseKept& row = rows[y];

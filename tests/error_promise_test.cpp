@@ -1,7 +1,7 @@
 // What --error-px promises: pictures of CAD files keep it on both tracers, and what does not keep it is found out.
 #include "runtime/derived_scene.h"
 #include "runtime/error_promise.h"
-#include "runtime/pixel_rays.h"
+#include "runtime/reference_rays.h"
 #include "tests/traced_file.h"
 #include "tests/traced_scenes.h"
 
@@ -63,7 +63,7 @@ TEST(error_promise, is_kept_by_both_tracers)
 /// What the reference shows beside each pixel's middle.
 Frame shifted(const Judged& view, double by_px)
 {
-    const PixelRays rays(view.options.camera, view.options.width, view.options.height);
+    const ReferenceRays rays(view.options.camera, view.options.width, view.options.height);
     const ClosestReference closest(view.scene->pack.image);
     Frame frame = view.right;
     for (uint32_t y = 0; y < frame.height; ++y)
