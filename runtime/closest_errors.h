@@ -4,7 +4,7 @@
 
 #include "format/closest_reference.h"
 #include "runtime/image_io.h"
-#include "runtime/pixel_rays.h"
+#include "runtime/reference_rays.h"
 #include "runtime/tracer.h"
 
 #include <cstdint>
@@ -56,7 +56,7 @@ private:
     std::shared_ptr<const Scene> scene_; // before what refers to it
     ClosestReference closest_;
     CameraRays steps_; // from pixel to pixel
-    PixelRays rays_;
+    ReferenceRays rays_;
     uint32_t width_, height_;
     Frame frame_;
     Picture picture_; // over white

@@ -1,6 +1,7 @@
 #include "runtime/command_budget.h"
 
 #include "runtime/command_trace.h"
+#include "runtime/enlarge.h"
 #include "runtime/image_io.h"
 #include "runtime/median.h"
 

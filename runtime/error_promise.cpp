@@ -1,6 +1,6 @@
 #include "runtime/error_promise.h"
 
-#include "runtime/pixel_rays.h"
+#include "runtime/reference_rays.h"
 
 #include <algorithm>
 #include <cmath>
@@ -37,12 +37,13 @@ struct Claim {
 /// The reference around one pixel's middle.
 class Surroundings {
 public:
-    Surroundings(const ClosestReference& closest, const PixelRays& rays, uint32_t x, uint32_t y)
+    Surroundings(const ClosestReference& closest, const ReferenceRays& rays, uint32_t x, uint32_t y)
         : closest_(closest), rays_(rays), x_(x + 0.5), y_(y + 0.5)
     {
     }
 
-    /// Whether `claim` is met within reach_px, by `directions` rays around the middle at each of `rings` distances.
+    /// Whether `claim` is met within reach_px, by `directions` rays around the middle at each of `rings` distances,
+    /// each half of the next: what a ray grazes is often seen a hair beside it alone.
     bool show(const Claim& claim, double reach_px, int directions, int rings) const
     {
         const Shown middle = at(x_, y_);
@@ -51,8 +52,9 @@ public:
         std::vector<Shown> inner(size_t(directions), middle);
         for (int ring = 1; ring <= rings; ++ring) {
             std::vector<Shown> outer;
+            const double away = std::ldexp(reach_px, ring - rings);
             for (int i = 0; i < directions; ++i) {
-                const double angle = 2 * std::numbers::pi * i / directions, away = reach_px * ring / rings;
+                const double angle = 2 * std::numbers::pi * i / directions;
                 outer.push_back(at(x_ + away * std::cos(angle), y_ + away * std::sin(angle)));
                 if (claim.meets(outer.back()))
                     return true;
@@ -75,35 +77,39 @@ private:
         return {x, y, true, hit.distance_mm, int64_t(hit.face), int64_t(hit.instance)};
     }
 
-    /// A face that is hit before the claim and, from another place, behind it: somewhere between as far, unless it has
-    /// a jump there or something hides it.
-    bool met_between(const Claim& claim, Shown before, Shown behind) const
+    /// Whether a place on the line between two meets the claim. Where both hit its face, before it and behind it, one
+    /// does, unless the face has a jump there or something hides it; where one alone hits it, its rim is between them,
+    /// and depths beside a rim change faster than any ring of places sees.
+    bool met_between(const Claim& claim, Shown a, Shown b) const
     {
         constexpr int kHalvings = 40;
-        if (!claim.is_of_face(before) || !claim.is_of_face(behind))
+        if (!claim.is_of_face(a) && !claim.is_of_face(b))
             return false;
-        if (before.distance_mm > behind.distance_mm)
-            std::swap(before, behind);
+        const bool to_rim = !claim.is_of_face(a) || !claim.is_of_face(b);
+        // of the halves the one that keeps its ends unlike: one of the face and one not, or one before the claim
+        const auto side = [&](const Shown& shown) {
+            return to_rim ? claim.is_of_face(shown) : shown.distance_mm < claim.distance_mm;
+        };
+        if (side(a) == side(b))
+            return false;
         for (int i = 0; i < kHalvings; ++i) {
-            if (!(before.distance_mm <= claim.distance_mm && claim.distance_mm <= behind.distance_mm))
-                return false;
-            const Shown middle = at(0.5 * (before.x + behind.x), 0.5 * (before.y + behind.y));
+            const Shown middle = at(0.5 * (a.x + b.x), 0.5 * (a.y + b.y));
             if (claim.meets(middle))
                 return true;
-            if (!claim.is_of_face(middle))
+            if (!to_rim && !claim.is_of_face(middle))
                 return false;
-            (middle.distance_mm < claim.distance_mm ? before : behind) = middle;
+            (side(middle) == side(a) ? a : b) = middle;
         }
         return false;
     }
 
     const ClosestReference& closest_;
-    const PixelRays& rays_;
+    const ReferenceRays& rays_;
     double x_, y_;
 };
 
 constexpr int kDirections = 8, kRings = 2;
-constexpr int kManyDirections = 64, kManyRings = 8; // before a pixel is called broken
+constexpr int kManyDirections = 64, kManyRings = 13; // before a pixel is called broken: to 1/4096 of the reach
 
 } // namespace
 
@@ -118,7 +124,7 @@ const BrokenPixel* PromiseKept::worst() const
 PromiseKept hold_to_promise(const Frame& traced, const Frame& right, const Camera& camera,
                             const ClosestReference& closest, double error_px)
 {
-    const PixelRays rays(camera, traced.width, traced.height);
+    const ReferenceRays rays(camera, traced.width, traced.height);
     std::vector<PromiseKept> rows(traced.height);
     tbb::parallel_for(0u, traced.height, [&](uint32_t y) {
         PromiseKept& row = rows[y];

@@ -37,7 +37,7 @@ struct PromiseKept {
 /// Holds `traced` to the promise of `error_px`. `right` is the reference's frame of the same camera and size. A pixel
 /// is kept where one of the rays within `error_px` of its middle misses as it does, or hits as far from the eye to
 /// error_px footprints, or where two that are neighbours hit its face before and behind it and so does, by halving,
-/// a ray between them. Rays are cast around pixels that differ alone: 16, and 512 before one is called broken.
+/// a ray between them. Rays are cast around pixels that differ alone: 16, and 832 before one is called broken.
 /// Domain: frames of equal size; error_px > 0.
 PromiseKept hold_to_promise(const Frame& traced, const Frame& right, const Camera& camera,
                             const ClosestReference& closest, double error_px);

@@ -5,7 +5,7 @@
 #include "runtime/frame_effects.h"
 #include "runtime/frame_size.h"
 #include "runtime/image_io.h"
-#include "runtime/pixel_rays.h"
+#include "runtime/reference_rays.h"
 #include "runtime/tracer.h"
 
 #include <algorithm>
@@ -92,7 +92,7 @@ public:
 private:
     void trace(const RenderOptions& options, WorkCounts& work, Frame& frame) const
     {
-        const PixelRays rays(options.camera, options.width, options.height);
+        const ReferenceRays rays(options.camera, options.width, options.height);
         std::atomic<uint64_t> patches{0}, uncertified{0};
         std::mutex telling;
         uint32_t rows_done = 0;

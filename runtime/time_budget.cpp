@@ -57,7 +57,8 @@ std::vector<Effort> effort_ladder(const RenderOptions& options, uint32_t samples
         while (ladder.back().*what > fewest)
             add(what, std::max(ladder.back().*what / 2, fewest));
     };
-    halve(&Effort::samples, 1);
+    while (ladder.back().samples > 1) // about half of the rays each
+        add(&Effort::samples, (2 * ladder.back().samples + 1) / 3);
     halve(&Effort::occlusion, kFewestRays);
     halve(&Effort::light_samples, kFewestRays);
     if (ladder.back().light_samples > 0)

@@ -2,7 +2,7 @@
 // and the search for the best rung of it that fits. Neither knows a clock or a tracer: times come from outside.
 //
 // Only effort is given up, never content: lines, maps, sections and transparency stay, and so does exactness, which
-// costs next to nothing (README.md, What it costs and gives).
+// costs next to nothing (ACCURACY.md).
 #pragma once
 
 #include "format/result.h"

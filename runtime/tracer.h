@@ -70,7 +70,7 @@ struct RenderOptions {
     bool reuse_last = false;
     uint32_t threads = 0;             // 0: all cores
     uint32_t frames = 1;              // timed frames; the picture is the last one's
-    float error_px = 0.02f;           // how far off its ray, in pixels, a point that Newton ends at may lie
+    float error_px = 0.02f;           // each pixel shows what lies within so many of its middle (ACCURACY.md)
     bool shade = true;                // fill rgba
     bool record_trim_queries = false; // with TrimMode::Reference: fill RenderStats::trim_queries
     // Told the share of a frame that is done, by one thread at a time. By the reference alone: the others are done at

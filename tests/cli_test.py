@@ -489,6 +489,17 @@ class Render(CliTest):
         for a, b in zip(*middles):
             self.assertAlmostEqual(a, b, delta=1.5)
 
+    def test_a_time_budget_holds_through_vulkan_too(self):
+        asked = ["--size", "48x32", "--samples", 2, "--device", "vulkan"]
+        without, within = WORK / "vulkan.png", WORK / "vulkan_within.png"
+        if run("render", PACK, "-o", without, *asked).returncode == 4:
+            self.skipTest("no Vulkan driver")
+        self.ok("render", PACK, "-o", within, *asked, "--time-budget", "1e9")
+        self.assertEqual(without.read_bytes(), within.read_bytes())
+        budget = self.json_of("render", PACK, "-o", within, *asked, "--time-budget", "1e-6", "--json")["time_budget"]
+        self.assertEqual([one["to"] for one in budget["gave_up"]], ["1 x 1", "1/2"])
+        self.assertEqual(read_png(within)[:2], (48, 32))
+
     def test_each_picture_has_its_time_budget(self):
         report = self.json_of("render", PACK, "-o", WORK / "budgeted_%d.exr", "--size", "64x48", "--device", "cpu",
                               "--turntable", 2, "--time-budget", "1e-6", "--json")

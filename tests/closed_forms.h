@@ -3,6 +3,7 @@
 #pragma once
 
 #include "format/reference_math.h"
+#include "runtime/reference_rays.h"
 #include "tests/keep_vulkan_loaded.h"
 #include "tests/traced_scenes.h"
 
@@ -95,31 +96,22 @@ inline std::optional<Drawn> drawn_by(bool vulkan, const std::shared_ptr<const Sc
 class PixelRays {
 public:
     explicit PixelRays(const RenderOptions& options)
-        : width_(options.width), parallel_(options.camera.orthographic_mm > 0)
+        : width_(options.width), rays_(options.camera, options.width, options.height)
     {
-        if (parallel_) {
-            const ParallelRays rays = parallel_rays(options.camera, options.width, options.height);
-            corner_ = rays.corner, step_x_ = rays.step_x, step_y_ = rays.step_y, fixed_ = rays.direction;
-        } else {
-            const CameraRays rays = camera_rays(options.camera, options.width, options.height);
-            corner_ = rays.corner, step_x_ = rays.step_x, step_y_ = rays.step_y, fixed_ = rays.eye;
-        }
     }
 
     reference::Ray through(double x, double y) const
     {
-        using reference::operator+;
         using reference::operator*;
-        const Vec3 at = corner_ + step_x_ * x + step_y_ * y;
-        return parallel_ ? reference::Ray{at, fixed_} : reference::Ray{fixed_, at * (1 / reference::length(at))};
+        const reference::Ray ray = rays_.through(x, y);
+        return {ray.origin, ray.direction * (1 / reference::length(ray.direction))};
     }
     reference::Ray of_pixel(size_t i) const { return through(double(i % width_) + 0.5, double(i / width_) + 0.5); }
     Vec3 hit(const Frame& frame, size_t i) const { return of_pixel(i).at(double(frame.depth_mm[i])); }
 
 private:
     uint32_t width_;
-    bool parallel_;
-    Vec3 corner_{}, step_x_{}, step_y_{}, fixed_{};
+    ReferenceRays rays_;
 };
 
 /// For suites of both tracers; the parameter says whether it is Vulkan's.

@@ -1,6 +1,6 @@
 // Pictures traced smaller and enlarged: nothing moves, the background stays, and every AOV is one that was traced.
-#include "runtime/image_io.h"
-#include "runtime/pixel_rays.h"
+#include "runtime/enlarge.h"
+#include "runtime/reference_rays.h"
 
 #include <gtest/gtest.h>
 
@@ -36,8 +36,8 @@ TEST(enlarge, what_is_traced_sees_the_middles_of_the_pixels_that_it_stands_for)
                 EXPECT_EQ(traced.width, (size.width + shrink - 1) / shrink);
                 EXPECT_EQ(traced.height, (size.height + shrink - 1) / shrink);
                 EXPECT_FLOAT_EQ(traced.edge_width_px * float(shrink), options.edge_width_px);
-                const PixelRays large(options.camera, size.width, size.height);
-                const PixelRays small(traced.camera, traced.width, traced.height);
+                const ReferenceRays large(options.camera, size.width, size.height);
+                const ReferenceRays small(traced.camera, traced.width, traced.height);
                 for (const uint32_t x : {0u, traced.width / 3, traced.width - 1})
                     for (const uint32_t y : {0u, traced.height / 3, traced.height - 1}) {
                         const reference::Ray a = small.through(x + 0.5, y + 0.5);

@@ -1,7 +1,7 @@
 // What --error-px promises: pictures of CAD files keep it on both tracers, and what does not keep it is found out.
 #include "runtime/derived_scene.h"
 #include "runtime/error_promise.h"
-#include "runtime/pixel_rays.h"
+#include "runtime/reference_rays.h"
 #include "tests/traced_file.h"
 #include "tests/traced_scenes.h"
 
@@ -63,7 +63,7 @@ TEST(error_promise, is_kept_by_both_tracers)
 /// What the reference shows beside each pixel's middle.
 Frame shifted(const Judged& view, double by_px)
 {
-    const PixelRays rays(view.options.camera, view.options.width, view.options.height);
+    const ReferenceRays rays(view.options.camera, view.options.width, view.options.height);
     const ClosestReference closest(view.scene->pack.image);
     Frame frame = view.right;
     for (uint32_t y = 0; y < frame.height; ++y)
@@ -79,7 +79,7 @@ Frame shifted(const Judged& view, double by_px)
 
 TEST(error_promise, a_picture_moved_by_part_of_a_pixel_keeps_that_part_and_no_less)
 {
-    const Judged view(scene_of_test_model("nozzle.stp"), 32, 24);
+    const Judged view(scene_of_test_model("nozzle.stp"), 24, 18);
     const Frame moved = shifted(view, 0.3);
     const PromiseKept wide = view.judge(moved, 0.3);
     EXPECT_EQ(wide.broken.size(), 0u);
@@ -110,7 +110,7 @@ TEST(error_promise, a_hit_out_of_thin_air_and_a_depth_that_is_no_number_break_it
 
 TEST(error_promise, is_broken_by_one_start_in_one_leaf_a_patch)
 {
-    Judged view(with_leaf_budget(*scene_of_test_model("nozzle.stp"), 1), 64, 36);
+    Judged view(with_leaf_budget(*scene_of_test_model("nozzle.stp"), 1), 48, 27);
     view.options.closest = ClosestPolicy::Stochastic;
     EXPECT_GT(view.judge(draw(view.scene, view.options).frame, 0.02).broken.size(), 0u);
 }
@@ -119,7 +119,7 @@ TEST(error_promise, is_broken_by_textures_that_are_too_small)
 {
     constexpr double kBytes = 500;
     const auto scene = scene_of_test_model("io1-cm-214.stp");
-    Judged view(with_textures(*scene, {.source = TrimSource::Mask, .layout = TrimLayout::Square}, kBytes), 160, 90);
+    Judged view(with_textures(*scene, {.source = TrimSource::Mask, .layout = TrimLayout::Square}, kBytes), 64, 36);
     view.options.trim = TrimMode::Sdf;
     EXPECT_GT(view.judge(draw(view.scene, view.options).frame, 0.02).broken.size(), 0u);
 }

@@ -19,7 +19,7 @@ import tempfile
 
 from corpus import SLACK_SECONDS, cad_files, decompressed, run
 
-KEPT, NOT_PACKED = "kept", "not packed"
+KEPT, NOT_PACKED, TIME_IS_UP = "kept", "not packed", "time is up"
 
 
 def columns(errors):
@@ -46,13 +46,14 @@ def measure_file(corpus, name, options, tools):
         code, _, message, wall, _ = run(command, options.timeout + SLACK_SECONDS)
         row["s_pack"] = f"{wall:.1f}"
         if code not in (0, 6):
-            row.update(verdict=NOT_PACKED, remark=message[:200])
+            # the packer's own limit, or that on it
+            row.update(verdict=TIME_IS_UP if "[E502]" in message or code == -1 else NOT_PACKED, remark=message[:200])
             return row
         command = [tools["promise"], str(pack), "--size", options.size, "--error-px", ",".join(options.error_px)]
         code, out, message, wall, _ = run(command, options.timeout)
         row["s_measure"] = f"{wall:.1f}"
         if code not in (0, 1):
-            row.update(verdict="time is up" if code == -1 else f"exit code {code}", remark=message[:200])
+            row.update(verdict=TIME_IS_UP if code == -1 else f"exit code {code}", remark=message[:200])
             return row
     remarks = []
     for error, line in zip(options.error_px, map(json.loads, out.splitlines())):

@@ -67,8 +67,8 @@ TEST(time_budget, the_ladder_gives_up_one_thing_after_the_other)
         now.*member = value;
         expected.push_back(now);
     };
-    then(&Effort::samples, 2u);
-    then(&Effort::samples, 1u);
+    for (const uint32_t samples : {3u, 2u, 1u})
+        then(&Effort::samples, samples);
     then(&Effort::occlusion, 10u);
     then(&Effort::occlusion, 5u);
     then(&Effort::occlusion, 4u);

@@ -10,9 +10,9 @@
 
 namespace trimray {
 
-class PixelRays {
+class ReferenceRays {
 public:
-    PixelRays(const Camera& camera, uint32_t width, uint32_t height)
+    ReferenceRays(const Camera& camera, uint32_t width, uint32_t height)
         : parallel_(camera.orthographic_mm > 0), from_eye_(camera_rays(camera, width, height)),
           side_by_side_(parallel_rays(camera, width, height))
     {
