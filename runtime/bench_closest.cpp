@@ -1,5 +1,6 @@
 #include "runtime/bench_closest.h"
 
+#include "runtime/bench_view.h"
 #include "runtime/command_trace.h"
 #include "runtime/derived_scene.h"
 #include "runtime/median.h"
@@ -87,11 +88,7 @@ Result<ClosestView> measure_view(const std::string& name, const Camera& camera,
                                  const ClosestBenchOptions& options,
                                  const std::function<void(const std::string&)>& progress)
 {
-    RenderOptions render;
-    render.width = options.width;
-    render.height = options.height;
-    render.camera = camera;
-    render.threads = options.threads;
+    RenderOptions render = picture_options(options, camera);
     render.trim = TrimMode::Exact;
     progress(fmt::format("{}: reference", name));
     Result<ReferencePicture> reference = ReferencePicture::make(scene, render);

@@ -1,5 +1,6 @@
 #include "runtime/bench_effects.h"
 
+#include "runtime/bench_view.h"
 #include "runtime/command_trace.h"
 #include "runtime/differing_pixels.h"
 #include "runtime/median.h"
@@ -96,11 +97,7 @@ Result<RenderOptions> picture_of(const Effect& effect, const PackImage& image, c
         return camera.error();
     for (SectionPlane& plane : request.look.section.planes)
         plane.point_mm = camera->target;
-    RenderOptions render;
-    render.width = options.width;
-    render.height = options.height;
-    render.threads = options.threads;
-    render.camera = *camera;
+    RenderOptions render = picture_options(options, *camera);
     render.specialise = std::string(effect.name) != "unspecialised";
     if (const Status applied = apply_request(request, diagonal_mm(image), render); !applied.ok())
         return applied.error();

@@ -134,11 +134,7 @@ Result<TrimView> measure_view(const std::string& name, const Camera& camera, con
                               const std::vector<Contestant>& contestants, const TrimBenchOptions& options,
                               const std::function<void(const std::string&)>& progress)
 {
-    RenderOptions render;
-    render.width = options.width;
-    render.height = options.height;
-    render.camera = camera;
-    render.threads = options.threads;
+    RenderOptions render = picture_options(options, camera);
     render.frames = 2; // the first fetches what the second finds in the caches
     progress(fmt::format("{}: reference", name));
     std::vector<TrimQueries> asked;
