@@ -160,6 +160,7 @@ class Render(CliTest):
         self.assertEqual(out.read_bytes(), without)
         report = json.loads(done.stdout)
         self.assertEqual(list(report), self.KEYS + ["time_budget"])
+        self.assertTrue({"occlusion", "shadows", "soft-shadows"} <= set(report["effects"]), report["effects"])
         budget = report["time_budget"]
         self.assertEqual(list(budget), ["ms", "measured_ms", "fits", "gave_up"])
         self.assertEqual((budget["ms"], budget["fits"], budget["gave_up"]), (1e9, True, []))
@@ -171,7 +172,8 @@ class Render(CliTest):
         asked = ["--size", "150x101", "--device", "cpu", "--samples", 3, "--occlusion", 8, "--shadows", "soft",
                  "--antialias", "trims"]
         done = self.ok("render", PACK, "-o", out, *asked, "--time-budget", "1e-6", "--json")
-        budget = json.loads(done.stdout)["time_budget"]
+        report = json.loads(done.stdout)
+        budget = report["time_budget"]
         self.assertFalse(budget["fits"])
         self.assertGreater(budget["measured_ms"], 1e-6)
         self.assertEqual([list(one) for one in budget["gave_up"]], [["what", "from", "to"]] * 5)
@@ -182,7 +184,11 @@ class Render(CliTest):
         self.assertIn("over the budget", done.stderr)
         for one in budget["gave_up"]:
             self.assertIn(f"{one['what']} {one['from']} -> {one['to']}", done.stderr)
-        self.ok("render", PACK, "-o", whole, *asked)
+        least = self.json_of("render", PACK, "-o", whole, *asked[:4], "--shadows", "hard", "--json")
+        self.assertEqual(report["effects"], least["effects"], "what it was made with, not what was asked for")
+        self.assertEqual(list(report["work"]), list(least["work"]))
+        self.assertTrue({"occlusion", "soft-shadows", "trim-antialiasing"} <=
+                        set(self.json_of("render", PACK, "-o", whole, *asked, "--json")["effects"]))
         (width, height, hasty), (_, _, right) = read_png(out), read_png(whole)
         self.assertEqual((width, height), (150, 101), "enlarged to the size that was asked for")
         for pixel in (hasty[0][3], hasty[-1][-1]):
@@ -208,10 +214,14 @@ class Render(CliTest):
 
     def test_each_picture_has_its_time_budget(self):
         report = self.json_of("render", PACK, "-o", WORK / "budgeted_%d.exr", "--size", "64x48", "--device", "cpu",
-                              "--turntable", 2, "--time-budget", "1e-6", "--json")
+                              "--antialias", "trims", "--turntable", 2, "--time-budget", "1e-6", "--json")
         self.assertNotIn("time_budget", report)
         for number, picture in enumerate(report["pictures"], 1):
-            self.assertEqual(picture["time_budget"]["gave_up"], [{"what": "size traced", "from": "full", "to": "1/3"}])
+            self.assertEqual([tuple(one.values()) for one in picture["time_budget"]["gave_up"]],
+                             [("smoothed trims", "yes", "no"), ("size traced", "full", "1/3")])
+            self.assertEqual(picture["effects"], report["effects"])
+            self.assertNotIn("trim-antialiasing", picture["effects"])
+            self.assertNotIn("edge_tests", picture["work"])
             self.assertTrue((WORK / f"budgeted_{number}.exr").exists())
 
     def test_wrong_time_budgets_are_usage_errors(self):
