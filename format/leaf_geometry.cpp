@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <numbers>
 
 namespace trimray {
 namespace {
@@ -13,7 +14,6 @@ constexpr double kQuatUnit = 32767;
 // Axes are turned by up to 5e-4 rad to lose 5 bits of noise; a leaf's surface turns by 0.2 rad, so its box barely
 // grows.
 constexpr int kQuatStep = 32;
-constexpr double kPi = 3.14159265358979323846;
 
 double signed_low(uint bits)
 {
@@ -85,7 +85,8 @@ std::array<Point3, 3> nearest_to_identity(const std::array<Point3, 3>& axes)
 double largest_on_arc(double a, double b, double lo, double hi)
 {
     const double peak = std::atan2(b, a);
-    const double nearest = peak + 2 * kPi * std::ceil((lo - peak) / (2 * kPi)); // first peak at or after lo
+    const double nearest =
+        peak + 2 * std::numbers::pi * std::ceil((lo - peak) / (2 * std::numbers::pi)); // first peak at or after lo
     if (nearest <= hi)
         return std::hypot(a, b);
     return std::max(a * std::cos(lo) + b * std::sin(lo), a * std::cos(hi) + b * std::sin(hi));

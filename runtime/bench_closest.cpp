@@ -1,5 +1,7 @@
 #include "runtime/bench_closest.h"
 
+#include "runtime/bench_turns.h"
+#include "runtime/bench_view.h"
 #include "runtime/command_trace.h"
 #include "runtime/derived_scene.h"
 #include "runtime/median.h"
@@ -31,38 +33,34 @@ Result<Tracers> make_tracers(const std::shared_ptr<const Scene>& scene, const st
     return tracers;
 }
 
-const std::vector<double>& times_of(const RenderStats& stats)
-{
-    return stats.frame_cpu_ms.empty() ? stats.frame_ms : stats.frame_cpu_ms;
-}
-
 /// What the rounds compare: one frame each.
-struct Contestant {
+struct Way {
     ClosestPolicy policy;
     bool one_leaf;
 };
-constexpr Contestant kContestants[] = {
+constexpr Way kWays[] = {
     {ClosestPolicy::Stochastic, true}, {ClosestPolicy::Stochastic, false}, {ClosestPolicy::Certified, false}};
-constexpr size_t kPlain = 1, kCertified = 2, kContestantCount = std::size(kContestants);
+constexpr size_t kPlain = 1, kCertified = 2, kWayCount = std::size(kWays);
 
-/// Milliseconds of each contestant in each round.
+/// Milliseconds of each way in each round.
 Result<std::vector<std::vector<double>>> time_first_frames(const Tracers& tracers, RenderOptions render,
                                                            const ClosestBenchOptions& options)
 {
-    std::vector<std::vector<double>> ms(kContestantCount);
+    std::vector<std::vector<double>> ms(kWayCount);
     render.frames = 1;
-    for (uint32_t round = 0; round < options.rounds; ++round)
-        for (size_t turn = 0; turn < kContestantCount; ++turn) {
-            const size_t which = round % 2 == 0 ? turn : kContestantCount - 1 - turn;
-            render.closest = kContestants[which].policy;
-            RenderStats stats;
-            for (int warm = 0; warm < 2; ++warm) { // the first fetches what the second finds in the caches
-                const Result<Frame> frame = tracers.with(kContestants[which].one_leaf).render(render, stats);
-                if (!frame.ok())
-                    return frame.error();
-            }
-            ms[which].push_back(times_of(stats).back());
+    const Status timed = take_turns(options.rounds, kWayCount, [&](uint32_t, size_t which) -> Status {
+        render.closest = kWays[which].policy;
+        RenderStats stats;
+        for (int warm = 0; warm < 2; ++warm) { // the first fetches what the second finds in the caches
+            const Result<Frame> frame = tracers.with(kWays[which].one_leaf).render(render, stats);
+            if (!frame.ok())
+                return frame.error();
         }
+        ms[which].push_back(frame_times(stats).back());
+        return Done{};
+    });
+    if (!timed.ok())
+        return timed.error();
     return ms;
 }
 
@@ -76,7 +74,7 @@ Result<ClosestFigures> measure_picture(Tracer& tracer, RenderOptions render, boo
     figures.policy = render.closest;
     figures.one_leaf = one_leaf;
     figures.frames = render.frames;
-    figures.frame_ms = median(times_of(stats));
+    figures.frame_ms = median(frame_times(stats));
     figures.newton_steps = double(stats.work.newton_steps) / double(stats.work.rays);
     figures.errors = reference.errors(*frame);
     return figures;
@@ -87,11 +85,7 @@ Result<ClosestView> measure_view(const std::string& name, const Camera& camera,
                                  const ClosestBenchOptions& options,
                                  const std::function<void(const std::string&)>& progress)
 {
-    RenderOptions render;
-    render.width = options.width;
-    render.height = options.height;
-    render.camera = camera;
-    render.threads = options.threads;
+    RenderOptions render = picture_options(options, camera);
     render.trim = TrimMode::Exact;
     progress(fmt::format("{}: reference", name));
     Result<ReferencePicture> reference = ReferencePicture::make(scene, render);
@@ -103,12 +97,9 @@ Result<ClosestView> measure_view(const std::string& name, const Camera& camera,
         return ms.error();
 
     ClosestView view{name, camera, 0, {}};
-    std::vector<double> costs;
-    for (uint32_t round = 0; round < options.rounds; ++round)
-        costs.push_back((*ms)[kCertified][round] / (*ms)[kPlain][round]);
-    view.certified_cost = median(std::move(costs));
-    for (size_t which = 0; which < kContestantCount; ++which) {
-        const auto [policy, one_leaf] = kContestants[which];
+    view.certified_cost = median(time_ratios((*ms)[kCertified], (*ms)[kPlain]));
+    for (size_t which = 0; which < kWayCount; ++which) {
+        const auto [policy, one_leaf] = kWays[which];
         const bool certified = policy == ClosestPolicy::Certified;
         render.closest = policy;
         const size_t first = view.figures.size();

@@ -45,9 +45,9 @@ struct ClosestBenchOptions {
     std::vector<std::string> views{"iso", "front", "top"};
 };
 
-/// First frames and the certified one are timed in rounds: each once in a round, in order and the next round backwards;
-/// each time two are traced and the second is timed. Later stochastic frames are timed as they are made, the longest
-/// picture's. `progress` is told what is being done. Fails: as Tracer::render; Usage (a view's name).
+/// First frames and the certified one take turns (bench_turns.h); each time two are traced and the second is timed.
+/// Later stochastic frames are timed as they are made, the longest picture's. `progress` is told what is being done.
+/// Fails: as Tracer::render; Usage (a view's name).
 Result<ClosestReport> bench_closest(const std::shared_ptr<const Scene>& scene, const ClosestBenchOptions& options,
                                     const std::function<void(const std::string&)>& progress);
 

@@ -1,5 +1,7 @@
 #include "runtime/bench_effects.h"
 
+#include "runtime/bench_turns.h"
+#include "runtime/bench_view.h"
 #include "runtime/command_trace.h"
 #include "runtime/differing_pixels.h"
 #include "runtime/median.h"
@@ -10,7 +12,6 @@
 
 #include <algorithm>
 #include <optional>
-#include <span>
 #include <utility>
 
 namespace trimray {
@@ -96,11 +97,7 @@ Result<RenderOptions> picture_of(const Effect& effect, const PackImage& image, c
         return camera.error();
     for (SectionPlane& plane : request.look.section.planes)
         plane.point_mm = camera->target;
-    RenderOptions render;
-    render.width = options.width;
-    render.height = options.height;
-    render.threads = options.threads;
-    render.camera = *camera;
+    RenderOptions render = picture_options(options, *camera);
     render.specialise = std::string(effect.name) != "unspecialised";
     if (const Status applied = apply_request(request, diagonal_mm(image), render); !applied.ok())
         return applied.error();
@@ -146,19 +143,17 @@ Status measure_once(const std::shared_ptr<const Scene>& scene, const EffectsBenc
     return Done{};
 }
 
-/// Adds a round's time of each effect. Fails: as Tracer::render.
-Status time_round(std::span<Measured> measured)
+/// Adds a round's time of an effect, if the tracer has it. Fails: as Tracer::render.
+Status time_once(Measured& one)
 {
-    for (Measured& one : measured) {
-        if (!one.figures.unsupported.empty())
-            continue;
-        RenderOptions twice = one.render;
-        twice.frames = 2; // the first fetches what the second finds in the caches
-        RenderStats stats;
-        if (const Result<Frame> frame = one.tracer->render(twice, stats); !frame.ok())
-            return frame.error();
-        one.round_ms.push_back(stats.frame_cpu_ms.empty() ? stats.frame_ms.back() : stats.frame_cpu_ms.back());
-    }
+    if (!one.figures.unsupported.empty())
+        return Done{};
+    RenderOptions twice = one.render;
+    twice.frames = 2; // the first fetches what the second finds in the caches
+    RenderStats stats;
+    if (const Result<Frame> frame = one.tracer->render(twice, stats); !frame.ok())
+        return frame.error();
+    one.round_ms.push_back(frame_times(stats).back());
     return Done{};
 }
 
@@ -196,20 +191,19 @@ Result<EffectsReport> bench_effects(const std::shared_ptr<const Scene>& scene, c
             return made.error();
         report.device = one.tracer->device_name();
     }
-    for (uint32_t round = 0; round < options.rounds; ++round) {
+    const Status timed = take_turns(options.rounds, measured.size(), [&](uint32_t round, size_t i) {
         progress(fmt::format("round {} of {}", round + 1, options.rounds));
-        if (const Status timed = time_round(measured); !timed.ok())
-            return timed.error();
-    }
+        return time_once(measured[i]);
+    });
+    if (!timed.ok())
+        return timed.error();
     const bool has_none = measured.front().figures.effect == "none";
     for (Measured& one : measured) {
         EffectFigures& figures = one.figures;
         if (!one.round_ms.empty())
             figures.frame_ms = median(one.round_ms);
         if (has_none && figures.unsupported.empty()) {
-            std::vector<double> ratios;
-            for (size_t round = 0; round < one.round_ms.size(); ++round)
-                ratios.push_back(one.round_ms[round] / measured.front().round_ms[round]);
+            const std::vector<double> ratios = time_ratios(one.round_ms, measured.front().round_ms);
             figures.time_to_none = ratios.empty() ? 0 : median(ratios);
             figures.differing_pixels = differing_pixels(measured.front().frame, one.frame);
         }

@@ -42,7 +42,8 @@ struct EffectsBenchOptions {
 /// "none", then one name for each effect, and last "unspecialised": "none" with RenderOptions::specialise off.
 std::vector<std::string> effect_names();
 
-/// The model framed from iso. Each effect has a tracer to itself; frames are timed in turns, each after one untimed.
+/// The model framed from iso. Each effect has a tracer to itself; frames are timed in turns (bench_turns.h),
+/// each after one untimed.
 /// `progress` is told what is being done. Fails: as make_tracer and Tracer::render, but for effects that the tracer
 /// has not; Usage (no such effect).
 Result<EffectsReport> bench_effects(const std::shared_ptr<const Scene>& scene, const EffectsBenchOptions& options,

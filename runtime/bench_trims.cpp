@@ -1,5 +1,6 @@
 #include "runtime/bench_trims.h"
 
+#include "runtime/bench_turns.h"
 #include "runtime/bench_view.h"
 #include "runtime/command_json.h"
 #include "runtime/command_trace.h"
@@ -121,24 +122,11 @@ Result<Frame> trace_reference(Tracer& tracer, RenderOptions render, std::vector<
     return frame;
 }
 
-/// kd's time over the other's in each round, their median.
-double speed_to_kd(const Times& kd, const Times& other)
-{
-    std::vector<double> speeds;
-    for (size_t round = 0; round < kd.frame_ms.size(); ++round)
-        speeds.push_back(kd.frame_ms[round] / other.frame_ms[round]);
-    return median(std::move(speeds));
-}
-
 Result<TrimView> measure_view(const std::string& name, const Camera& camera, const TrimReference& reference,
                               const std::vector<Contestant>& contestants, const TrimBenchOptions& options,
                               const std::function<void(const std::string&)>& progress)
 {
-    RenderOptions render;
-    render.width = options.width;
-    render.height = options.height;
-    render.camera = camera;
-    render.threads = options.threads;
+    RenderOptions render = picture_options(options, camera);
     render.frames = 2; // the first fetches what the second finds in the caches
     progress(fmt::format("{}: reference", name));
     std::vector<TrimQueries> asked;
@@ -151,33 +139,33 @@ Result<TrimView> measure_view(const std::string& name, const Camera& camera, con
     const size_t count = contestants.size();
     TrimView view{name, camera, std::vector<TrimFigures>(count)};
     std::vector<Times> times(count);
-    for (uint32_t round = 0; round < options.rounds; ++round) {
+    const Status timed = take_turns(options.rounds, count, [&](uint32_t round, size_t i) -> Status {
+        const Contestant& contestant = contestants[i];
         progress(fmt::format("{}: round {} of {}", name, round + 1, options.rounds));
-        for (size_t turn = 0; turn < count; ++turn) {
-            const size_t i = round % 2 == 0 ? turn : count - 1 - turn;
-            const Contestant& contestant = contestants[i];
-            render.trim = contestant.setting.mode;
-            render.edges = contestant.setting.edges ? EdgeLines::Sharp : EdgeLines::None;
-            RenderStats stats;
-            const Result<Frame> frame = contestant.tracer->render(render, stats);
-            if (!frame.ok())
-                return frame.error();
-            times[i].frame_ms.push_back(stats.frame_cpu_ms.empty() ? stats.frame_ms.back() : stats.frame_cpu_ms.back());
-            const auto [seconds, wrong] = queries.run(*contestant.scene->prepared, contestant.setting.mode);
-            times[i].query_seconds = std::min(times[i].query_seconds, seconds);
-            view.figures[i].wrong_queries = wrong;
-            view.figures[i].bytes = trim_bytes(contestant) + stats.border_bytes;
-            if (round == 0)
-                view.figures[i].errors = trim_errors(contestant.scene->pack.image, reference, rays, *frame, *right);
-            if (contestant.setting.edges) // the reference's picture has none
-                view.figures[i].errors.psnr_db = std::numeric_limits<double>::quiet_NaN();
-        }
-    }
+        render.trim = contestant.setting.mode;
+        render.edges = contestant.setting.edges ? EdgeLines::Sharp : EdgeLines::None;
+        RenderStats stats;
+        const Result<Frame> frame = contestant.tracer->render(render, stats);
+        if (!frame.ok())
+            return frame.error();
+        times[i].frame_ms.push_back(frame_times(stats).back());
+        const auto [seconds, wrong] = queries.run(*contestant.scene->prepared, contestant.setting.mode);
+        times[i].query_seconds = std::min(times[i].query_seconds, seconds);
+        view.figures[i].wrong_queries = wrong;
+        view.figures[i].bytes = trim_bytes(contestant) + stats.border_bytes;
+        if (round == 0)
+            view.figures[i].errors = trim_errors(contestant.scene->pack.image, reference, rays, *frame, *right);
+        if (contestant.setting.edges) // the reference's picture has none
+            view.figures[i].errors.psnr_db = std::numeric_limits<double>::quiet_NaN();
+        return Done{};
+    });
+    if (!timed.ok())
+        return timed.error();
     for (size_t i = 0; i < count; ++i) {
         TrimFigures& figures = view.figures[i];
         figures.setting = contestants[i].setting;
         figures.frame_ms = median(times[i].frame_ms);
-        figures.speed_to_kd = speed_to_kd(times[0], times[i]);
+        figures.speed_to_kd = median(time_ratios(times[0].frame_ms, times[i].frame_ms));
         figures.queries = queries.asked();
         figures.ns_per_query =
             times[i].query_seconds * 1e9 / static_cast<double>(std::max<uint64_t>(queries.asked(), 1));

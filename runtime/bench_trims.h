@@ -57,10 +57,9 @@ struct TrimBenchOptions {
     double magnification = 8; // of the close-up
 };
 
-/// A round times every setting once, in order and the next round backwards, so that a slow drift of the machine falls
-/// on all alike; each time two frames are traced and the second is timed, with the caches as a viewer has them. Queries
-/// are those that the reference's picture asks, in its order, answered again by the mode alone; the time is that of
-/// their loop over the lanes that ask. `progress` is told what is being done, view by view.
+/// Settings take turns (bench_turns.h); each time two frames are traced and the second is timed, with the caches as a
+/// viewer has them. Queries are those that the reference's picture asks, in its order, answered again by the mode
+/// alone; the time is that of their loop over the lanes that ask. `progress` is told what is being done, view by view.
 /// Fails: as Tracer::render; Usage (a view's name).
 Result<TrimReport> bench_trims(const std::shared_ptr<const Scene>& scene, const TrimBenchOptions& options,
                                const std::function<void(const std::string&)>& progress);

@@ -77,11 +77,11 @@ double half_height(double fov_deg)
 // far away to 4e-9 of the height, pairs of floats to 1e-7.
 constexpr double kParallelFrom = 3e7;
 
-struct View {
+struct StandardView {
     const char* name;
     Vec3 looks_along, up;
 };
-constexpr View kViews[] = {
+constexpr StandardView kViews[] = {
     {"iso", {-1, 1, -1}, {0, 0, 1}},  {"front", {0, 1, 0}, {0, 0, 1}},  {"back", {0, -1, 0}, {0, 0, 1}},
     {"left", {1, 0, 0}, {0, 0, 1}},   {"right", {-1, 0, 0}, {0, 0, 1}}, {"top", {0, 0, -1}, {0, 1, 0}},
     {"bottom", {0, 0, 1}, {0, 1, 0}},
@@ -89,16 +89,16 @@ constexpr View kViews[] = {
 constexpr double kBorder = 1.04; // a little air around the model
 
 /// Null: no such view.
-const View* find_view(const std::string& name)
+const StandardView* find_view(const std::string& name)
 {
     const std::string wanted = name.empty() ? "iso" : name;
-    const auto found =
-        std::find_if(std::begin(kViews), std::end(kViews), [&](const View& view) { return wanted == view.name; });
+    const auto found = std::find_if(std::begin(kViews), std::end(kViews),
+                                    [&](const StandardView& view) { return wanted == view.name; });
     return found == std::end(kViews) ? nullptr : found;
 }
 
 /// The camera turned as the view is, its eye at the origin.
-void turn(const View& view, Camera& camera)
+void turn(const StandardView& view, Camera& camera)
 {
     camera.up = view.up;
     camera.eye = {0, 0, 0};
@@ -134,7 +134,7 @@ const std::vector<std::string>& standard_view_names()
 {
     static const std::vector<std::string> names = [] {
         std::vector<std::string> all;
-        for (const View& view : kViews)
+        for (const StandardView& view : kViews)
             all.emplace_back(view.name);
         return all;
     }();
@@ -143,7 +143,7 @@ const std::vector<std::string>& standard_view_names()
 
 bool standard_view(const std::string& name, const Reach& reach, double aspect, double fov_deg, Camera& camera)
 {
-    const View* const view = find_view(name);
+    const StandardView* const view = find_view(name);
     if (view == nullptr)
         return false;
     camera.fov_deg = fov_deg;
@@ -172,7 +172,7 @@ bool standard_view(const std::string& name, const Reach& reach, double aspect, d
 bool standard_orthographic_view(const std::string& name, const Reach& reach, double aspect, double height_mm,
                                 Camera& camera)
 {
-    const View* const view = find_view(name);
+    const StandardView* const view = find_view(name);
     if (view == nullptr)
         return false;
     camera.orthographic_mm = height_mm > 0 ? height_mm : 1;

@@ -116,6 +116,7 @@ Result<Frame> BudgetedPictures::trace(const RenderOptions& options, RenderStats&
             continue;
         best = std::move(made->frame);
         stats = std::move(made->stats);
+        report.made = effort;
         report.gave_up = given_up(ladder_.front(), effort);
     }
     report.budget_ms = budget_ms_;

@@ -16,6 +16,7 @@ struct BudgetReport {
     // A frame's tracing and shading (the median of RenderOptions::frames), and averaging its samples and enlarging it
     double measured_ms = 0;
     bool fits = false;
+    Effort made; // what the picture is made with
     std::vector<GivenUp> gave_up;
 };
 

@@ -43,9 +43,10 @@ struct PictureJob {
     Camera from;
 };
 
-/// What a picture took.
+/// What a picture took, and what it is made with: what is asked for less what its time budget gave up.
 struct PictureReport {
     std::string file, camera;
+    RenderOptions made_with;
     RenderStats stats;
     std::optional<BudgetReport> budget;
 };
@@ -161,13 +162,14 @@ double rays_per_second(const RenderStats& stats)
     return static_cast<double>(stats.work.rays) / (median(stats.frame_ms) * 1e-3);
 }
 
-Json work_json(const RenderOptions& options, const WorkCounts& work)
+Json work_json(const PictureReport& picture)
 {
+    const WorkCounts& work = picture.stats.work;
     const double rays = static_cast<double>(std::max<uint64_t>(work.rays, 1));
     Json json = {{"leaf_visits", static_cast<double>(work.leaf_visits) / rays},
                  {"newton_steps", static_cast<double>(work.newton_steps) / rays},
                  {"curve_tests", static_cast<double>(work.curve_tests) / rays}};
-    if (edge_query(options).any())
+    if (edge_query(picture.made_with).any())
         json["edge_tests"] = static_cast<double>(work.edge_tests) / rays;
     if (work.free_rays > 0) { // of lights, occlusion and mirrors
         json["free_rays"] = static_cast<double>(work.free_rays) / rays;
@@ -176,9 +178,19 @@ Json work_json(const RenderOptions& options, const WorkCounts& work)
     return json;
 }
 
-/// One picture's keys are those of the whole; those of several are in a list.
-Json report_json(const RenderArguments& arguments, PictureSize size, const PackImage& image,
-                 const RenderOptions& options, const EffectPlan& plan, const std::vector<PictureReport>& pictures)
+/// The names of what the tracer did for a picture.
+Json effects_json(const PackFacts& facts, const PictureReport& picture, DeviceKind device)
+{
+    Json names = Json::array();
+    for (const EffectItem& item : effect_plan(facts, picture.made_with, device).items)
+        names.push_back(item.name);
+    return names;
+}
+
+/// One picture's keys are those of the whole; those of several are in a list. Effects are the first's, and in the list
+/// where a time budget may make them differ.
+Json report_json(const RenderArguments& arguments, PictureSize size, const PackImage& image, const PackFacts& facts,
+                 DeviceKind device, const EffectPlan& plan, const std::vector<PictureReport>& pictures)
 {
     const bool several = arguments.view.several();
     const RenderStats& stats = pictures.front().stats;
@@ -197,12 +209,10 @@ Json report_json(const RenderArguments& arguments, PictureSize size, const PackI
     bytes.trim_kd = stats.kd_bytes;
     bytes.borders = stats.border_bytes;
     report["bytes"] = to_json(bytes);
-    report["effects"] = Json::array();
-    for (const EffectItem& item : plan.items)
-        report["effects"].push_back(item.name);
+    report["effects"] = effects_json(facts, pictures.front(), device);
     if (!several) {
         report["uncertified_pixels"] = stats.work.uncertified_pixels;
-        report["work"] = work_json(options, stats.work);
+        report["work"] = work_json(pictures.front());
         if (pictures.front().budget)
             report["time_budget"] = to_json(*pictures.front().budget);
     }
@@ -217,9 +227,11 @@ Json report_json(const RenderArguments& arguments, PictureSize size, const PackI
                                                          {"ms_per_frame", times_json(picture.stats)},
                                                          {"rays_per_second", rays_per_second(picture.stats)},
                                                          {"uncertified_pixels", picture.stats.work.uncertified_pixels},
-                                                         {"work", work_json(options, picture.stats.work)}});
-        if (picture.budget)
+                                                         {"work", work_json(picture)}});
+        if (picture.budget) {
+            one["effects"] = effects_json(facts, picture, device);
             one["time_budget"] = to_json(*picture.budget);
+        }
     }
     return report;
 }
@@ -259,6 +271,7 @@ Status make_picture(Tracer& tracer, const RenderOptions& options, uint32_t sampl
                                    : trace_picture(tracer, options, samples, picture.stats);
     if (!frame.ok())
         return frame.error();
+    picture.made_with = picture.budget ? with_effort(options, picture.budget->made) : options;
     if (options.look.background)
         composite_over(*frame, *options.look.background);
     return write_image(picture.file, *frame);
@@ -321,7 +334,7 @@ int run_render(const RenderArguments& arguments)
     for (const PictureJob& job : *jobs) {
         progress.begin(pictures.size(), *options);
         options->camera = job.from;
-        PictureReport& picture = pictures.emplace_back(PictureReport{job.file, job.camera, {}, {}});
+        PictureReport& picture = pictures.emplace_back(PictureReport{job.file, job.camera, {}, {}, {}});
         const Status made = make_picture(**tracer, *options, samples, budgeted, picture);
         if (!made.ok() || picture.budget)
             progress.clear();
@@ -332,7 +345,7 @@ int run_render(const RenderArguments& arguments)
     }
     progress.clear();
     if (arguments.json)
-        print_json(report_json(arguments, *size, image, *options, plan, pictures));
+        print_json(report_json(arguments, *size, image, facts, (*tracer)->device_kind(), plan, pictures));
     return kExitOk;
 }
 

@@ -3,6 +3,7 @@
 // pack, view and device; with --rays for each pack and device, over pictures from around and inside of the model, and
 // one over all packs at the end. A tool for corpora.
 #include "tests/against_reference.h"
+#include "tests/pack_request.h"
 #include "tests/views_around.h"
 
 #include "format/leaf_geometry.h"
@@ -22,12 +23,10 @@ namespace {
 using namespace trimray;
 using Json = nlohmann::ordered_json;
 
-struct Request {
-    std::vector<std::string> packs, views{"iso", "front", "top"}, devices{"cpu"};
+struct Request : PackRequest {
     bool ortho = false; // parallel rays
     uint32_t width = 320, height = 180;
     float error_px = RenderOptions{}.error_px;
-    size_t listed = 5;
     uint64_t rays = 0; // a pack; 0: the views
 };
 
@@ -214,15 +213,10 @@ int main(int argc, char** argv)
 {
     CLI::App app("Pictures of the tracers against the reference for closest hits, one line of JSON each");
     Request request;
-    app.add_option("PACK", request.packs, "Scene packs (.tray)")->required();
-    app.add_option("--views", request.views, "Of the whole model: iso, front, ...")->delimiter(',');
-    app.add_option("--devices", request.devices, "cpu, vulkan (software drivers too)")
-        ->delimiter(',')
-        ->check(CLI::IsMember({"cpu", "vulkan"}));
+    request.add_options(app, "Pixels listed in each line, sure faults of a picture first");
     app.add_option("--width", request.width)->check(CLI::Range(1u, 16384u));
     app.add_option("--height", request.height)->check(CLI::Range(1u, 16384u));
     app.add_option("--error-px", request.error_px, "The tracers' own dial");
-    app.add_option("--listed", request.listed, "Pixels listed in each line, sure faults of a picture first");
     app.add_flag("--ortho", request.ortho, "By parallel rays");
     app.add_option("--rays", request.rays, "Rays a pack, from around and inside of it, in place of the views");
     CLI11_PARSE(app, argc, argv);

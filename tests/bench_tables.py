@@ -59,12 +59,18 @@ def table(header, rows):
     print()
 
 
+def decompressed(path, folder):
+    """The file itself, or what a `.zst` one holds, in `folder`."""
+    if path.suffix != ".zst":
+        return path
+    plain = pathlib.Path(folder) / plain_name(path)
+    subprocess.run(["zstd", "-d", "-q", "-f", path, "-o", plain], check=True)
+    return plain
+
+
 def pack_of(path, folder, build):
     """The pack of a model (`.zst` ones are decompressed first), made in `folder`; a pack is its own."""
-    model = path
-    if path.suffix == ".zst":
-        model = pathlib.Path(folder) / plain_name(path)
-        subprocess.run(["zstd", "-d", "-q", path, "-o", model], check=True)
+    model = decompressed(path, folder)
     if model.suffix == ".tray":
         return model
     pack = pathlib.Path(folder) / "model.tray"

@@ -10,23 +10,21 @@ there has to end with one line that says why, the exit code of its class, and no
 Exit code: 0 when every row is `ok`, 1 otherwise.
 """
 
-import argparse
 import csv
 import fnmatch
 import json
-import os
 import pathlib
-import resource
-import signal
 import subprocess
 import sys
 import tempfile
 import time
 
+from bench_tables import decompressed
+from corpus_tables import SLACK_SECONDS, arguments, built, chosen_files, done_rows, run
+
 PHASES = ["read", "transfer", "faces", "mesh", "convert", "trims", "bvh", "proxy", "preview", "write"]
 COLUMNS = (["file", "verdict", "exit", "faces", "expected", "converted", "dropped"] + [f"s_{p}" for p in PHASES] +
            ["s_wall", "peak_mib", "pack_bytes", "zst_bytes", "remark"])
-CAD_ENDINGS = {".step", ".stp", ".igs", ".iges", ".brep"}
 # A file without a shape is invalid input, or one that made the kernel crash.
 REFUSALS = {3, 4, 5}
 # What is right although it is not "ok": the verdict that is expected, and why.
@@ -37,51 +35,11 @@ KNOWN = {
     "large/composite_voron_klicky_parts_x3.step.zst":
         ("faces dropped", "four faces between two edges with the same curve: no area"),
 }
-SLACK_SECONDS = 20  # the converter's own limit comes first, and gives the clearer message
-
-
-def cad_files(corpus):
-    """Paths relative to the corpus, small files first."""
-    found = []
-    for path in corpus.rglob("*"):
-        name = path.name[:-4] if path.name.endswith(".zst") else path.name
-        if path.is_file() and pathlib.Path(name).suffix.lower() in CAD_ENDINGS:
-            found.append(path)
-    return [p.relative_to(corpus) for p in sorted(found, key=lambda p: (p.stat().st_size, str(p)))]
 
 
 def manifest_faces(corpus):
     with open(corpus / "MANIFEST.tsv", newline="", encoding="utf-8") as table:
         return {row["path"]: int(row["faces_unique"]) for row in csv.DictReader(table, delimiter="\t")}
-
-
-def run(command, timeout, memory_bytes=0):
-    """Exit code, stdout, last line of stderr, wall seconds, peak MiB of the process and its children. -1: time is up."""
-    def limit():
-        os.setsid()
-        if memory_bytes:
-            resource.setrlimit(resource.RLIMIT_AS, (memory_bytes, memory_bytes))
-    start = time.monotonic()
-    with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
-        process = subprocess.Popen(command, stdout=out, stderr=err, preexec_fn=limit)
-        code, usage = None, None
-        while code is None:
-            pid, status, usage = os.wait4(process.pid, os.WNOHANG)
-            if pid:
-                code = os.waitstatus_to_exitcode(status)
-            elif time.monotonic() - start > timeout:
-                os.killpg(process.pid, signal.SIGKILL)
-                os.wait4(process.pid, 0)
-                code = -1
-            else:
-                time.sleep(0.01)
-        process.returncode = code
-        wall = time.monotonic() - start
-        out.seek(0)
-        err.seek(0)
-        lines = [line for line in err.read().decode(errors="replace").splitlines() if line.strip()]
-        return (code, out.read().decode(errors="replace"), lines[-1] if lines else "", wall,
-                usage.ru_maxrss / 1024 if usage else 0)
 
 
 def compressed_size(path):
@@ -90,14 +48,6 @@ def compressed_size(path):
     with subprocess.Popen(["zstd", "-19", "-q", "-c", str(path)], stdout=subprocess.PIPE) as process:
         size = len(process.stdout.read())
     return size
-
-
-def decompressed(path, folder):
-    if path.suffix != ".zst":
-        return path
-    plain = pathlib.Path(folder) / path.name[:-4]
-    subprocess.run(["zstd", "-d", "-q", "-f", str(path), "-o", str(plain)], check=True)
-    return plain
 
 
 def why_faces_differ(model, faces, expected, pack_command, timeout):
@@ -172,32 +122,20 @@ def check_file(corpus, name, expected, tools, timeout, pack_dir):
     return row
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("corpus", type=pathlib.Path)
-    parser.add_argument("-o", "--output", type=pathlib.Path, default=pathlib.Path("corpus.tsv"))
-    parser.add_argument("--only", action="append", default=[], metavar="GLOB", help="e.g. 'small/*'; may be repeated")
+def add_options(parser):
     parser.add_argument("--skip", action="append", default=[], metavar="GLOB")
-    parser.add_argument("--build", type=pathlib.Path, default=pathlib.Path(__file__).resolve().parent.parent / "build")
-    parser.add_argument("--timeout", type=float, default=600, help="seconds a file")
     parser.add_argument("--limit-seconds", type=float, default=float("inf"), help="start no further file after this")
     parser.add_argument("--keep", type=pathlib.Path, metavar="DIR", help="keep the packs there")
-    options = parser.parse_args()
 
-    tools = {"pack": options.build / "bin" / "trimray-pack", "trimray": options.build / "bin" / "trimray"}
-    for tool in tools.values():
-        if not tool.exists():
-            sys.exit(f"{tool}: not built")
+
+def main():
+    options = arguments(__doc__, "corpus.tsv", 600, "seconds a file", add_options)
+    tools = built(options, pack="bin/trimray-pack", trimray="bin/trimray")
     if options.keep:
         options.keep.mkdir(parents=True, exist_ok=True)
     expected = manifest_faces(options.corpus)
-    done = {}
-    if options.output.exists():
-        with open(options.output, newline="", encoding="utf-8") as table:
-            done = {row["file"]: row for row in csv.DictReader(table, delimiter="\t")}
-    names = [n for n in cad_files(options.corpus)
-             if (not options.only or any(fnmatch.fnmatch(str(n), g) for g in options.only))
-             and not any(fnmatch.fnmatch(str(n), g) for g in options.skip)]
+    done = done_rows(options)
+    names = [n for n in chosen_files(options) if not any(fnmatch.fnmatch(str(n), g) for g in options.skip)]
 
     start = time.monotonic()
     rows = []

@@ -477,21 +477,91 @@ TEST(cpu_tracer, few_rays_ask_a_leaf_that_lies_askew)
     EXPECT_LT(drawn.stats.work.leaf_visits, 10 * hits);
 }
 
+/// A flat square, turned by `angle` radians, whose only leaf has the square itself as its box, of no thickness.
+struct LeafSquare {
+    static constexpr double kHalf = 1.0 / 256, kPart_mm = 10; // half a side, in part units
+    std::shared_ptr<const Scene> scene;
+    PatchRecord patch;
+
+    explicit LeafSquare(double angle)
+    {
+        TracedScene model;
+        model.with_textures = false;
+        PatchRecord& own = model.add_bezier(1, 1, false, kHalf, {-0.61, 0.27, 0.05});
+        own.axis_x[0] = own.axis_y[1] = float(std::cos(angle));
+        own.axis_x[1] = float(std::sin(angle));
+        own.axis_y[0] = -own.axis_x[1];
+        patch = own;
+        model.image.control_points = {-1, -1, 0, -1, 1, 0, 1, -1, 0, 1, 1, 0};
+        Scene tight;
+        tight.pack.image = model.finish()->pack.image;
+        EXPECT_EQ(tight.pack.image.leaves.size(), 1u);
+        constexpr uint kOne = 16384; // kLeafQuantum
+        LeafRecord& leaf = tight.pack.image.leaves.front();
+        leaf.center_xy = 0;
+        leaf.center_z_half_x = kOne << 16;
+        leaf.half_yz = kOne;
+        leaf.quat_xy = 0;
+        leaf.quat_z_bend &= 0xffff0000u;
+        scene = std::make_shared<const Scene>(tight);
+    }
+
+    /// World mm of (x, y) in patch units, where the square is [-1, 1]^2.
+    Point at(double x, double y) const
+    {
+        Point p;
+        for (size_t i = 0; i < 3; ++i)
+            p[i] = kPart_mm * (double(patch.origin_hi[i]) + patch.origin_lo[i] +
+                               kHalf * (x * patch.axis_x[i] + y * patch.axis_y[i]));
+        return p;
+    }
+
+    /// How far inside the square a ray from `eye` passes, mm; negative outside.
+    double inside_mm(Point eye, Point direction) const
+    {
+        const Point middle = at(0, 0);
+        const double t = (middle[2] - eye[2]) / direction[2];
+        double x = 0, y = 0;
+        for (size_t i = 0; i < 3; ++i) {
+            const double off = eye[i] + t * direction[i] - middle[i];
+            x += off * patch.axis_x[i];
+            y += off * patch.axis_y[i];
+        }
+        return kPart_mm * kHalf - std::max(std::abs(x), std::abs(y));
+    }
+};
+
 TEST(cpu_tracer, no_leaf_is_lost_where_a_pixel_is_a_millionth_of_the_part)
 {
-    const double c = std::cos(0.37), s = std::sin(0.37);
-    TracedScene model = patch_grid(0, 7);
-    model.place({c, -s, 0, 0, s, c, 0, 0, 0, 0, 1, 0});
-    const auto scene = model.finish();
-    for (const double column : {-3.0, 1.0, 5.0}) {
-        const double x = column * 10 / 6, y = 10.0 / 6; // four leaves meet there
-        const Point corner{c * x - s * y, s * x + c * y, 0};
-        for (const double height : {12.0, 0.1, 0.01}) {
-            const Point eye{corner[0] + 0.1 * height, corner[1] + 0.2 * height, height};
-            const double fov_deg = 180 / 3.14159265358979 * 300 * 1e-5 / height; // 300 pixels of 1e-5 mm
-            EXPECT_EQ(hits_of(render(scene, looking(eye, corner, fov_deg), 400, 300).frame), 400u * 300u)
-                << column << ' ' << height;
+    constexpr double kPixel_mm = 1e-5, kRounding_px = 0.2; // a ray nearer to a border may be on either side of it
+    constexpr uint32_t kWidth = 120, kHeight = 90;
+    for (const double angle : {0.0, 0.37, 1.2}) {
+        const LeafSquare square(angle);
+        size_t asked = 0, near = 0, lost = 0;
+        for (const Point spot : {Point{1, 1}, Point{1, -1}, Point{-1, 1}, Point{-1, -1}, Point{1, 0.3}, Point{-1, 0.3},
+                                 Point{0.3, 1}, Point{0.3, -1}}) {
+            for (const double above : {12.0, 0.1, 0.01}) {
+                const Point target = square.at(spot[0], spot[1]);
+                const Point eye{target[0] + 0.1 * above, target[1] + 0.2 * above, target[2] + above};
+                const Camera camera = looking(eye, target, 180 / std::numbers::pi * kHeight * kPixel_mm / above);
+                const Frame frame = render(square.scene, camera, kWidth, kHeight).frame;
+                const CameraRays rays = camera_rays(camera, kWidth, kHeight);
+                for (uint32_t y = 0; y < kHeight; ++y) {
+                    for (uint32_t x = 0; x < kWidth; ++x) {
+                        const double inside_px =
+                            square.inside_mm(rays.eye, direction_of(rays, x + 0.5, y + 0.5)) / kPixel_mm;
+                        if (inside_px < kRounding_px)
+                            continue;
+                        ++asked;
+                        near += inside_px < 1;
+                        lost += frame.face[size_t(y) * kWidth + x] < 0;
+                    }
+                }
+            }
         }
+        EXPECT_GT(asked, 90000u);
+        EXPECT_GT(near, 1000u);
+        EXPECT_EQ(lost, 0u) << "of " << asked << ", turned by " << angle;
     }
 }
 

@@ -3,6 +3,7 @@
 // broken, and the worst of these. A tool for corpora.
 #include "runtime/command_trace.h"
 #include "runtime/error_promise.h"
+#include "tests/pack_request.h"
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -17,12 +18,10 @@ namespace {
 using namespace trimray;
 using Json = nlohmann::ordered_json;
 
-struct Request {
-    std::vector<std::string> packs, views{"iso", "front", "top"}, devices{"cpu"};
+struct Request : PackRequest {
     std::vector<double> errors_px{0.02};
     std::optional<float> traced_with; // the tracers' dial, where it is not the error that is promised
     std::string trim = "auto", closest = "certified", size = "160x90";
-    size_t listed = 5;
 };
 
 /// A distance, or how far away a pixel's answer is shown; JSON has no infinity.
@@ -152,19 +151,14 @@ int main(int argc, char** argv)
     CLI::App app("Whether pictures keep what --error-px promises: one line of JSON a pack, device and error.\n"
                  "Exit code: 0 kept, 1 broken, 2 a pack that could not be measured");
     Request request;
-    app.add_option("PACK", request.packs, "Scene packs (.tray)")->required();
+    request.add_options(app, "Broken pixels listed in each line");
     app.add_option("--error-px", request.errors_px, "Errors, in pixels, that are promised [0.02]")
         ->delimiter(',')
         ->check(CLI::Range(1e-6, 4.0));
     app.add_option("--traced-with", request.traced_with, "The tracers' dial, where it is not the promised error");
-    app.add_option("--views", request.views, "Of the whole model: iso, front, ...")->delimiter(',');
-    app.add_option("--devices", request.devices, "cpu, vulkan (software drivers too)")
-        ->delimiter(',')
-        ->check(CLI::IsMember({"cpu", "vulkan"}));
     app.add_option("--size", request.size, "WIDTHxHEIGHT")->capture_default_str();
     app.add_option("--trim", request.trim)->check(CLI::IsMember(trim_choice().available));
     app.add_option("--closest", request.closest)->check(CLI::IsMember(closest_choice().available));
-    app.add_option("--listed", request.listed, "Broken pixels listed in each line")->capture_default_str();
     CLI11_PARSE(app, argc, argv);
     uint64_t broken = 0;
     bool failed = false;

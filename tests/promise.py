@@ -9,15 +9,14 @@ its file is done, and files that have a row are skipped, so an interrupted run g
 Exit code: 0 when every file that can be packed keeps the promise, 1 otherwise.
 """
 
-import argparse
 import csv
-import fnmatch
 import json
 import pathlib
 import sys
 import tempfile
 
-from corpus import SLACK_SECONDS, cad_files, decompressed, run
+from bench_tables import decompressed
+from corpus_tables import SLACK_SECONDS, arguments, built, chosen_files, done_rows, run
 
 KEPT, NOT_PACKED, TIME_IS_UP = "kept", "not packed", "time is up"
 
@@ -67,33 +66,21 @@ def measure_file(corpus, name, options, tools):
     return row
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("corpus", type=pathlib.Path)
-    parser.add_argument("-o", "--output", type=pathlib.Path, default=pathlib.Path("promise.tsv"))
-    parser.add_argument("--only", action="append", default=[], metavar="GLOB", help="e.g. 'small/*'; may be repeated")
-    parser.add_argument("--build", type=pathlib.Path, default=pathlib.Path(__file__).resolve().parent.parent / "build")
+def add_options(parser):
     parser.add_argument("--error-px", type=lambda text: text.split(","), default=["1", "0.1", "0.02", "0.001"])
     parser.add_argument("--size", default="160x90")
-    parser.add_argument("--timeout", type=float, default=300, help="seconds to pack a file, and to measure it")
-    options = parser.parse_args()
 
-    tools = {"pack": options.build / "bin" / "trimray-pack", "promise": options.build / "tests" / "error_promise"}
-    for tool in tools.values():
-        if not tool.exists():
-            sys.exit(f"{tool}: not built")
-    done = {}
-    if options.output.exists():
-        with open(options.output, newline="", encoding="utf-8") as table:
-            done = {row["file"]: row for row in csv.DictReader(table, delimiter="\t")}
-    names = [n for n in cad_files(options.corpus)
-             if not options.only or any(fnmatch.fnmatch(str(n), g) for g in options.only)]
+
+def main():
+    options = arguments(__doc__, "promise.tsv", 300, "seconds to pack a file, and to measure it", add_options)
+    tools = built(options, pack="bin/trimray-pack", promise="tests/error_promise")
+    done = done_rows(options)
     rows = []
     with open(options.output, "a", newline="", encoding="utf-8") as table:
         writer = csv.DictWriter(table, columns(options.error_px), delimiter="\t", lineterminator="\n")
         if table.tell() == 0:
             writer.writeheader()
-        for name in names:
+        for name in chosen_files(options):
             row = done.get(str(name))
             if row is None:
                 row = measure_file(options.corpus, name, options, tools)

@@ -23,7 +23,7 @@ namespace trimray {
 namespace {
 namespace fs = std::filesystem;
 
-struct Arguments {
+struct AccuracyArguments {
     std::vector<std::string> models;
     std::string folder, size = "640x360";
     uint32_t views = 3;
@@ -31,7 +31,7 @@ struct Arguments {
     bool json = false;
 };
 
-constexpr const char* kFooter =
+constexpr const char* kAccuracyFooter =
     "Each dial of the tracer is swept alone, then several together, from the same views; every picture is held "
     "against\n"
     "the reference in double. Pictures are timed in turns, on one thread by its processor time, so other programs\n"
@@ -117,7 +117,7 @@ Status write_report(const AccuracyReport& report, const std::string& folder)
     return Done{};
 }
 
-int run(Arguments arguments, const std::string& command)
+int run(AccuracyArguments arguments, const std::string& command)
 {
     AccuracyOptions& options = arguments.options;
     const Result<PictureSize> size = parse_size(arguments.size, 1);
@@ -171,7 +171,7 @@ void register_accuracy(CLI::App& app, const std::string& command_line, int& exit
 {
     CLI::App* command =
         app.add_subcommand("accuracy", "What accuracy costs in time and memory, measured on given models");
-    const auto a = std::make_shared<Arguments>();
+    const auto a = std::make_shared<AccuracyArguments>();
     command->add_option("MODEL", a->models, "CAD files, which have peers, or scene packs (.tray), which have none")
         ->required();
     command->add_option("-o,--output", a->folder, "The report's folder; made where it is missing")->required();
@@ -188,7 +188,7 @@ void register_accuracy(CLI::App& app, const std::string& command_line, int& exit
         ->check(CLI::Range(0u, 1024u))
         ->capture_default_str();
     command->add_flag("--json", a->json, "Print the report as one JSON object");
-    command->footer(kFooter);
+    command->footer(kAccuracyFooter);
     command->callback([a, command_line, &exit_code] { exit_code = run(*a, command_line); });
 }
 

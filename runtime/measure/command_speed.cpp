@@ -25,14 +25,14 @@ namespace trimray {
 namespace {
 namespace fs = std::filesystem;
 
-struct Arguments {
+struct SpeedArguments {
     std::vector<std::string> models;
     std::string size = "640x360", baseline, write_baseline;
     SpeedOptions options;
     bool check = false, json = false;
 };
 
-constexpr const char* kFooter =
+constexpr const char* kSpeedFooter =
     "The default picture of each view is timed in turns with baselines, which cancel how fast the machine is: the\n"
     "paper's shape of tracer (one ray at a time, one leaf a patch of the same pack, kd-trees), and, where the model\n"
     "is a CAD file, its triangles (deflection 1e-4 of the diagonal) traced by Embree. Speeds are the baseline's time\n"
@@ -61,7 +61,7 @@ std::string name_of(const std::string& model)
 }
 
 /// Stored runs know models by their names, and views by theirs.
-Status check_names(const Arguments& arguments)
+Status check_names(const SpeedArguments& arguments)
 {
     std::set<std::string> models, views;
     for (const std::string& model : arguments.models)
@@ -181,7 +181,7 @@ void warn_when_busy(const SpeedTable& table)
                                 100 * median(spreads)));
 }
 
-Json run_json(const Arguments& arguments, const std::vector<SpeedModel>& models,
+Json run_json(const SpeedArguments& arguments, const std::vector<SpeedModel>& models,
               const std::optional<SpeedComparison>& comparison)
 {
     const SpeedOptions& options = arguments.options;
@@ -210,7 +210,7 @@ Status write_table(const std::string& path, const SpeedTable& table)
 
 /// Measures all models, and prints each unless JSON is asked for. The exit code: that of the first that fails, which
 /// are reported, or kExitOk.
-int measure_models(const Arguments& arguments, std::vector<SpeedModel>& models)
+int measure_models(const SpeedArguments& arguments, std::vector<SpeedModel>& models)
 {
     int exit_code = kExitOk;
     for (const std::string& file : arguments.models) {
@@ -229,7 +229,7 @@ int measure_models(const Arguments& arguments, std::vector<SpeedModel>& models)
     return exit_code;
 }
 
-int run(Arguments arguments)
+int run(SpeedArguments arguments)
 {
     SpeedOptions& options = arguments.options;
     const Result<PictureSize> size = parse_size(arguments.size, 1);
@@ -275,7 +275,7 @@ int run(Arguments arguments)
 void register_speed(CLI::App& app, int& exit_code)
 {
     CLI::App* command = app.add_subcommand("speed", "Speed beside baselines, and exact counts, against a stored run");
-    const auto a = std::make_shared<Arguments>();
+    const auto a = std::make_shared<SpeedArguments>();
     command->add_option("MODEL", a->models, "Scene packs (.tray), or CAD files, which are converted")->required();
     command
         ->add_option("--views", a->options.views,
@@ -300,7 +300,7 @@ void register_speed(CLI::App& app, int& exit_code)
         ->add_flag("--check", a->check, "Exit code 6 where the stored run has other counts, or other models or views")
         ->needs(baseline);
     command->add_flag("--json", a->json, "Print one JSON object");
-    command->footer(kFooter);
+    command->footer(kSpeedFooter);
     command->callback([a, &exit_code] { exit_code = run(*a); });
 }
 

@@ -120,11 +120,7 @@ Result<AccuracyView> measure_view(const std::string& name, const std::shared_ptr
     const Result<Camera> camera = bench_view(name, scene, options.width, options.height, options.magnification);
     if (!camera.ok())
         return camera.error();
-    RenderOptions render;
-    render.width = options.width;
-    render.height = options.height;
-    render.threads = options.threads;
-    render.camera = *camera;
+    const RenderOptions render = picture_options(options, *camera);
     progress(fmt::format("{}: reference", name));
     Result<ReferencePicture> reference = ReferencePicture::make(scene, render);
     if (!reference.ok())

@@ -47,7 +47,7 @@ private:
 #endif
 };
 
-constexpr uint32_t kLookDone = kLookOrthographic; // LookBit
+constexpr uint32_t kMeshLook = kLookOrthographic; // LookBit
 
 struct ReleaseDevice {
     void operator()(RTCDevice device) const { rtcReleaseDevice(device); }
@@ -176,7 +176,7 @@ public:
             return possible.error();
         if (has_effects(options))
             return Error{ErrorCode::Usage, "mesh", "draws no lines and smooths no borders"};
-        if (const Status done = check_look(options, kLookDone, "mesh"); !done.ok())
+        if (const Status done = check_look(options, kMeshLook, "mesh"); !done.ok())
             return done.error();
         if (options.closest == ClosestPolicy::Stochastic)
             return Error{ErrorCode::Usage, "mesh", "draws no starts; --closest must be certified"};

@@ -18,8 +18,8 @@
 namespace trimray {
 namespace {
 
-constexpr uint32_t kLookDone = kLookOrthographic; // LookBit
-constexpr uint32_t kTileSide = 32;                // pixels: neighbours' rays meet the same patches
+constexpr uint32_t kOneRayLook = kLookOrthographic; // LookBit
+constexpr uint32_t kTileSide = 32;                  // pixels: neighbours' rays meet the same patches
 
 /// What a thread keeps from tile to tile.
 struct Scratch {
@@ -67,7 +67,7 @@ private:
         if (has_effects(options))
             return refusal("draws no lines and smooths no borders; leave out --edges, --silhouettes, --style and "
                            "--antialias");
-        if (const Status done = check_look(options, kLookDone, "one-ray"); !done.ok())
+        if (const Status done = check_look(options, kOneRayLook, "one-ray"); !done.ok())
             return done;
         if (options.closest != ClosestPolicy::Stochastic)
             return refusal("searches a leaf from one start and certifies nothing; --closest must be stochastic");

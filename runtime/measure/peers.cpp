@@ -51,10 +51,8 @@ Result<double> first_picture_ms(const std::function<Result<std::unique_ptr<Trace
         Result<std::unique_ptr<Tracer>> tracer = open();
         if (!tracer.ok())
             return tracer.error();
-        RenderOptions render;
-        render.width = options.width;
-        render.height = options.height;
-        render.camera = camera;
+        RenderOptions render = picture_options(options, camera);
+        render.threads = 0; // all cores, as a viewer has them
         ask(render);
         RenderStats stats;
         if (const Result<Frame> frame = (*tracer)->render(render, stats); !frame.ok())

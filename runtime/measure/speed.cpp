@@ -164,11 +164,7 @@ Result<SpeedLine> measure_line(const std::string& name, const Prepared& prepared
         bench_view(name, prepared.scene, options.width, options.height, options.magnification);
     if (!camera.ok())
         return camera.error();
-    RenderOptions render;
-    render.width = options.width;
-    render.height = options.height;
-    render.threads = options.threads;
-    render.camera = *camera;
+    const RenderOptions render = picture_options(options, *camera);
 
     SpeedLine line;
     line.view = name;

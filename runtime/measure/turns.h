@@ -1,8 +1,8 @@
-// Pictures of one view timed in turns by many contenders, so that what slows the machine for a while falls on all
-// alike.
+// Pictures of one view timed in turns (bench_turns.h) by many contenders.
 #pragma once
 
 #include "format/result.h"
+#include "runtime/bench_turns.h"
 #include "runtime/tracer.h"
 
 #include <cstddef>
@@ -48,8 +48,5 @@ constexpr double kLongPicture_ms = 1000;
 Result<TurnTimes> time_in_turns(const std::vector<Contender>& contenders, const RenderOptions& render, uint32_t rounds,
                                 const std::function<Status(size_t contender, const Made& made)>& first,
                                 const std::function<void(const std::string&)>& progress);
-
-/// Times of one contender over another's in the same round; where either was timed once, of the first alone.
-std::vector<double> time_ratios(const std::vector<double>& ms, const std::vector<double>& base_ms);
 
 } // namespace trimray
