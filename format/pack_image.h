@@ -24,10 +24,10 @@ private:
 };
 
 struct Provenance {
-    std::string source_name;       // file name without its folder
-    std::string source_format;     // "STEP AP214", "IGES 5.3", "BREP"
-    std::string source_unit;       // "MM", "INCH", "M": what the file says; the pack is in millimetres
-    std::string source_sha_or_xxh; // content hash of the source, "xxh3:<16 hex digits>"
+    std::string source_name;   // file name without its folder
+    std::string source_format; // "STEP AP214", "IGES 5.3", "BREP"
+    std::string source_unit;   // "MM", "INCH", "M": what the file says; the pack is in millimetres
+    std::string source_hash;   // content hash of the source, "xxh3-128:<32 hex digits>"; in older packs "xxh3:<16>"
     std::string tool_version;
     std::string options_json;
 };

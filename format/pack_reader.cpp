@@ -441,8 +441,8 @@ private:
             return;
         }
         Provenance& p = pack.image.provenance;
-        std::string* const fields[] = {&p.source_name,       &p.source_format, &p.source_unit,
-                                       &p.source_sha_or_xxh, &p.tool_version,  &p.options_json};
+        std::string* const fields[] = {&p.source_name, &p.source_format, &p.source_unit,
+                                       &p.source_hash, &p.tool_version,  &p.options_json};
         if (strings.size() < std::size(fields))
             fault(3129, id, fmt::format("{} strings, expected {}", strings.size(), std::size(fields)));
         else

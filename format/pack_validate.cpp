@@ -167,7 +167,7 @@ private:
                 report_.add(3206, "STRS", fmt::format("string {} is not UTF-8 text", i));
         const Provenance& p = image_.provenance;
         for (const std::string* s :
-             {&p.source_name, &p.source_format, &p.source_unit, &p.source_sha_or_xxh, &p.tool_version, &p.options_json})
+             {&p.source_name, &p.source_format, &p.source_unit, &p.source_hash, &p.tool_version, &p.options_json})
             if (!is_text(*s))
                 report_.add(3206, "prov", "not UTF-8 text");
     }

@@ -220,7 +220,7 @@ std::vector<Section> make_sections(const PackImage& image, int level)
     Bytes text;
     const Provenance& p = image.provenance;
     for (const std::string* s :
-         {&p.source_name, &p.source_format, &p.source_unit, &p.source_sha_or_xxh, &p.tool_version, &p.options_json})
+         {&p.source_name, &p.source_format, &p.source_unit, &p.source_hash, &p.tool_version, &p.options_json})
         append_string(text, *s);
     add(kSectionProvenance, 1, text);
     text.clear();

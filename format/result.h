@@ -45,6 +45,8 @@ enum class ErrorCode : int {
     KernelCrashed = 501,
     KernelTimedOut = 502,
     KernelOutOfMemory = 503,
+    KernelWroteTooMuch = 504,
+    Interrupted = 505,
     DeviceFailed = 510,
 };
 

@@ -9,6 +9,7 @@
 #include <OSD.hxx>
 #include <Standard_ErrorHandler.hxx>
 #include <Standard_Failure.hxx>
+#include <Standard_Version.hxx>
 
 #include <algorithm>
 #include <array>
@@ -161,20 +162,26 @@ void mesh_parts(const std::vector<PartShape>& parts, const ImportOptions& option
 
 } // namespace kernel
 
+std::string kernel_version()
+{
+    return fmt::format("OpenCASCADE {}", OCC_VERSION_COMPLETE);
+}
+
 Result<CadModel> import_cad(const std::string& path, const ImportOptions& options, const Progress& progress)
 {
     const Result<kernel::CadFormat> format = kernel::detect_format(path);
     if (!format)
         return format.error();
     const kernel::QuietKernel quiet;
-    const kernel::FaultsAsExceptions faults;
-
+    // a fault while it reads ends the process: the kernel's own data cannot be trusted after it, and where it happened
+    // is worth knowing. Faults of single faces, below, cost that face alone.
     std::optional<Result<kernel::LoadedFile>> loaded;
     if (const auto failure = kernel::failure_of([&] { loaded = kernel::load_file(path, *format, options, progress); }))
         return Error{ErrorCode::InvalidCad, path, *failure + "; the file is damaged, export it again"};
     if (!*loaded)
         return loaded->error();
     kernel::LoadedFile& file = **loaded;
+    const kernel::FaultsAsExceptions faults;
 
     CadModel model;
     model.source_format = file.source_format;

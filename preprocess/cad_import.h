@@ -27,4 +27,7 @@ using Progress = std::function<void(const char* phase, double share)>;
 /// damaged files: callers run this in a process of its own (see worker.h).
 Result<CadModel> import_cad(const std::string& path, const ImportOptions& options, const Progress& progress);
 
+/// "OpenCASCADE 7.6.3": what a conversion depends on beside its input and options.
+std::string kernel_version();
+
 } // namespace trimray

@@ -1,5 +1,6 @@
 // Files -> the kernel's documents: format detection, readers, units, and the kernel's global settings put back after.
 #include "preprocess/cad_import_kernel.h"
+#include "preprocess/cad_names.h"
 
 #include <APIHeaderSection_MakeHeader.hxx>
 #include <BRepTools.hxx>
@@ -34,6 +35,7 @@
 #include <filesystem>
 #include <fmt/format.h>
 #include <fstream>
+#include <optional>
 
 namespace trimray::kernel {
 namespace {
@@ -89,6 +91,20 @@ std::string sample_of(const std::string& head)
     for (const char c : head.substr(0, 24))
         sample += std::isprint(static_cast<unsigned char>(c)) ? c : '.';
     return sample;
+}
+
+/// A family's name, and what a file of it lacks that is not recognised.
+const char* signs_of(CadFamily family)
+{
+    switch (family) {
+    case CadFamily::Step:
+        return "STEP (no ISO-10303-21 at its start)";
+    case CadFamily::Iges:
+        return "IGES (no 80-column start section)";
+    case CadFamily::Brep:
+        break;
+    }
+    return "BREP (no CASCADE Topology line)";
 }
 
 bool looks_like_iges(const std::string& head)
@@ -412,7 +428,7 @@ Result<CadFormat> detect_format(const std::string& path)
     const std::pair<std::string_view, const char*> kOthers[] = {
         {"PK\x03\x04"sv, "a zip archive; unpack it first"},
         {"\x1f\x8b"sv, "gzip data; unpack it first"},
-        {"\x28\xb5\x2f\xfd"sv, "zstd data; give it a name that ends in .zst"},
+        {"\x28\xb5\x2f\xfd"sv, "zstd data; unpack it first"},
         {"<?xml"sv, "XML; export as STEP part 21 (.step) instead"},
         {"glTF"sv, "a glTF mesh; a CAD model with surfaces is needed"},
         {"solid "sv, "an STL mesh; a CAD model with surfaces is needed"},
@@ -428,17 +444,10 @@ Result<CadFormat> detect_format(const std::string& path)
         if (head.compare(0, magic.size(), magic) == 0)
             return Error{ErrorCode::UnsupportedFormat, path, fmt::format("is {}", what)};
 
-    const std::string extension = upper(std::filesystem::path(path).extension().string());
-    const auto claims = [&](std::initializer_list<const char*> names) {
-        return std::any_of(names.begin(), names.end(), [&](const char* name) { return extension == name; });
-    };
-    const char* claimed = claims({".STEP", ".STP", ".P21"})   ? "STEP (no ISO-10303-21 at its start)"
-                          : claims({".IGES", ".IGS"})         ? "IGES (no 80-column start section)"
-                          : claims({".BREP", ".BRP", ".RLE"}) ? "BREP (no CASCADE Topology line)"
-                                                              : nullptr;
-    if (claimed)
-        return Error{ErrorCode::InvalidCad, path,
-                     fmt::format("is not {}: it begins with \"{}\"; export it again", claimed, sample_of(head))};
+    if (const std::optional<CadFamily> claimed = cad_family(path))
+        return Error{
+            ErrorCode::InvalidCad, path,
+            fmt::format("is not {}: it begins with \"{}\"; export it again", signs_of(*claimed), sample_of(head))};
     return Error{
         ErrorCode::UnsupportedFormat, path,
         fmt::format("is neither STEP, IGES nor BREP: it begins with \"{}\"; export it as STEP", sample_of(head))};

@@ -1,60 +1,82 @@
 #include "preprocess/source_file.h"
 
+#include "preprocess/cad_names.h"
+#include "preprocess/content_hash.h"
+
 #include <algorithm>
 #include <cerrno>
+#include <cstdlib>
 #include <cstring>
 #include <fcntl.h>
 #include <filesystem>
 #include <fmt/format.h>
 #include <memory>
-#include <sys/stat.h>
-#include <unistd.h>
+#include <system_error>
 #include <utility>
 #include <vector>
-#include <xxhash.h>
-#include <zstd.h>
 
 namespace trimray {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr uint64_t kMaxDecompressed = 64ull << 30; // above any CAD file; a few kilobytes of zstd can ask for more
+constexpr std::string_view kMemberMark = "!/";
 
-struct Descriptor {
-    int fd = -1;
-    ~Descriptor()
-    {
-        if (fd >= 0)
-            ::close(fd);
-    }
-    int release() { return std::exchange(fd, -1); }
+/// A file, or a member of it.
+struct Place {
+    std::string file, member;
+    std::string text() const { return member.empty() ? file : fmt::format("{}{}{}", file, kMemberMark, member); }
 };
 
-struct Hash {
-    std::unique_ptr<XXH3_state_t, decltype(&XXH3_freeState)> state{XXH3_createState(), &XXH3_freeState};
-    Hash() { XXH3_64bits_reset(state.get()); }
-    void add(const void* data, size_t size) { XXH3_64bits_update(state.get(), data, size); }
-    std::string text() const { return fmt::format("xxh3:{:016x}", XXH3_64bits_digest(state.get())); }
-};
-
-/// Bytes read, 0 at the end, negative on failure.
-ssize_t read_chunk(int fd, std::vector<char>& chunk)
+/// A file of this very name, or the first "!/" after what is a file; else the name as it is.
+Place place_of(const std::string& path)
 {
-    ssize_t size = 0;
-    do
-        size = ::read(fd, chunk.data(), chunk.size());
-    while (size < 0 && errno == EINTR);
-    return size;
+    std::error_code none;
+    if (!fs::exists(path, none))
+        for (size_t at = 0; (at = path.find(kMemberMark, at)) != std::string::npos; at += kMemberMark.size())
+            if (const std::string file = path.substr(0, at); fs::is_regular_file(file, none))
+                return {file, path.substr(at + kMemberMark.size())};
+    return {path, ""};
 }
 
-Error unreadable(const std::string& path)
+/// The one CAD file in an archive. Fails: as list_members, Usage, EmptyCad.
+Result<Place> only_member(const std::string& archive, const SourceLimits& limits)
 {
-    return {ErrorCode::FileNotReadable, path, fmt::format("could not be read: {}", std::strerror(errno))};
+    const Result<std::vector<ArchiveMember>> members = list_members(archive, limits);
+    if (!members)
+        return members.error();
+    if (members->empty())
+        return Error{ErrorCode::EmptyCad, archive, "the archive holds no CAD file (.step, .iges, .brep)"};
+    if (members->size() == 1)
+        return Place{archive, members->front().path};
+    constexpr size_t kNamed = 3;
+    std::string names;
+    for (size_t i = 0; i < std::min(members->size(), kNamed); ++i)
+        names += fmt::format("{}{}", i == 0 ? "" : ", ", Place{archive, (*members)[i].path}.text());
+    return Error{ErrorCode::Usage, archive,
+                 fmt::format("the archive holds {} CAD files; name one: {}{}", members->size(), names,
+                             members->size() > kNamed ? ", ..." : "")};
+}
+
+/// The file's or member's bytes as they are stored; `place` becomes the archive's one member if it names none.
+Result<std::unique_ptr<ByteStream>> stored_bytes(Place& place, const SourceLimits& limits)
+{
+    Result<Descriptor> file = open_regular_file(place.file);
+    if (!file)
+        return file.error();
+    if (place.member.empty() && !is_zip(*file))
+        return file_stream(std::move(*file), place.file);
+    if (place.member.empty()) {
+        const Result<Place> only = only_member(place.file, limits);
+        if (!only)
+            return only.error();
+        place = *only;
+    }
+    return open_member(place.file, place.member, place.text(), limits);
 }
 
 /// A file in the temporary folder that is unlinked at once.
-Result<int> nameless_file()
+Result<Descriptor> nameless_file()
 {
     std::error_code error;
     const fs::path folder = fs::temp_directory_path(error);
@@ -62,120 +84,83 @@ Result<int> nameless_file()
         return Error{ErrorCode::FileNotWritable, "temporary folder",
                      fmt::format("{}; set TMPDIR to a folder that exists", error.message())};
     std::string name = (folder / "trimray-source-XXXXXX").string();
-    const int fd = ::mkostemp(name.data(), O_CLOEXEC);
-    if (fd < 0)
+    Descriptor file(::mkostemp(name.data(), O_CLOEXEC));
+    if (file.get() < 0)
         return Error{ErrorCode::FileNotWritable, folder.string(),
                      fmt::format("no temporary file: {}; set TMPDIR to a folder with room", std::strerror(errno))};
     ::unlink(name.c_str());
-    return fd;
+    return file;
 }
 
-Status write_all(int fd, const char* data, size_t size)
+Status write_all(const Descriptor& file, std::string_view bytes)
 {
-    while (size > 0) {
-        const ssize_t written = ::write(fd, data, size);
+    while (!bytes.empty()) {
+        const ssize_t written = ::write(file.get(), bytes.data(), bytes.size());
         if (written < 0 && errno == EINTR)
             continue;
         if (written <= 0)
             return Error{ErrorCode::FileNotWritable, "temporary file",
                          fmt::format("{}; set TMPDIR to a folder with room", std::strerror(errno))};
-        data += written;
-        size -= static_cast<size_t>(written);
+        bytes.remove_prefix(static_cast<size_t>(written));
     }
     return Done{};
 }
 
-/// Decompresses all frames of `in` into `out`; returns the number of bytes.
-Result<uint64_t> decompress(const std::string& path, int in, int out, Hash& hash)
+/// Reads `stream` into `file`.
+Result<Content> copy_content(ByteStream& stream, const Descriptor& file, const std::string& where,
+                             const SourceLimits& limits)
 {
-    const std::unique_ptr<ZSTD_DCtx, decltype(&ZSTD_freeDCtx)> context{ZSTD_createDCtx(), &ZSTD_freeDCtx};
-    std::vector<char> input(ZSTD_DStreamInSize()), output(ZSTD_DStreamOutSize());
     uint64_t total = 0;
-    size_t open_frame = 0; // 0: between frames
-    for (;;) {
-        const ssize_t got = read_chunk(in, input);
-        if (got < 0)
-            return unreadable(path);
-        if (got == 0)
-            break;
-        ZSTD_inBuffer source{input.data(), static_cast<size_t>(got), 0};
-        while (source.pos < source.size) {
-            ZSTD_outBuffer target{output.data(), output.size(), 0};
-            open_frame = ZSTD_decompressStream(context.get(), &target, &source);
-            if (ZSTD_isError(open_frame))
-                return Error{ErrorCode::InvalidCad, path,
-                             fmt::format("its zstd compression is damaged: {}; get a complete copy",
-                                         ZSTD_getErrorName(open_frame))};
-            total += target.pos;
-            if (total > kMaxDecompressed)
-                return Error{ErrorCode::InvalidCad, path, "decompresses to more than 64 GiB; this is no CAD file"};
-            hash.add(output.data(), target.pos);
-            if (const Status written = write_all(out, output.data(), target.pos); !written)
-                return written.error();
-        }
-    }
-    if (open_frame != 0)
-        return Error{ErrorCode::InvalidCad, path, "its zstd compression ends too early; get a complete copy"};
-    return total;
+    return read_content(stream, [&](std::string_view chunk) -> Status {
+        total += chunk.size();
+        if (total > limits.bytes)
+            return too_large(where, limits);
+        return write_all(file, chunk);
+    });
 }
 
 } // namespace
 
-Result<SourceFile> SourceFile::open(const std::string& path)
+Result<SourceFile> SourceFile::open(const std::string& path, const SourceLimits& limits)
 {
-    struct stat status {};
-    if (::stat(path.c_str(), &status) != 0)
-        return Error{errno == ENOENT || errno == ENOTDIR ? ErrorCode::FileNotFound : ErrorCode::FileNotReadable, path,
-                     fmt::format("{}; check the path", std::strerror(errno))};
-    if (!S_ISREG(status.st_mode))
-        return Error{ErrorCode::FileNotReadable, path, "is not a regular file; give the path of a CAD file"};
-    Descriptor in{::open(path.c_str(), O_RDONLY | O_CLOEXEC)};
-    if (in.fd < 0)
-        return unreadable(path);
+    Place place = place_of(path);
+    Result<std::unique_ptr<ByteStream>> stored = stored_bytes(place, limits);
+    if (!stored)
+        return stored.error();
+    Result<DecodedStream> stream = decoded(std::move(*stored), place.text());
+    if (!stream)
+        return stream.error();
 
     SourceFile source;
-    source.path = path;
-    source.name = fs::path(path).filename().string();
-    Hash hash;
-    constexpr unsigned char kZstdMagic[4] = {0x28, 0xb5, 0x2f, 0xfd};
-    unsigned char magic[4] = {};
-    if (::pread(in.fd, magic, sizeof magic, 0) == sizeof magic && std::equal(magic, magic + 4, kZstdMagic)) {
-        const Result<int> temporary = nameless_file();
-        if (!temporary)
-            return temporary.error();
-        Descriptor out{*temporary};
-        const Result<uint64_t> bytes = decompress(path, in.fd, out.fd, hash);
-        if (!bytes)
-            return bytes.error();
-        source.bytes = *bytes;
-        source.descriptor_ = out.release();
-        source.path = fmt::format("/proc/self/fd/{}", source.descriptor_);
-        if (source.name.ends_with(".zst"))
-            source.name.resize(source.name.size() - 4);
+    source.file = place.file;
+    source.name = without_folder(place.member.empty() ? place.file : place.member);
+    if (stream->was_compressed)
+        source.name = without_compression(source.name);
+    const bool is_copied = stream->was_compressed || !place.member.empty();
+    Result<Content> content = Content{};
+    if (is_copied) {
+        Result<Descriptor> copy = nameless_file();
+        if (!copy)
+            return copy.error();
+        content = copy_content(*stream->bytes, *copy, place.text(), limits);
+        source.path = fmt::format("/proc/self/fd/{}", copy->get());
+        source.copy_ = std::move(*copy);
     } else {
-        std::vector<char> chunk(1u << 20);
-        ssize_t size = 0;
-        while ((size = read_chunk(in.fd, chunk)) > 0) {
-            hash.add(chunk.data(), static_cast<size_t>(size));
-            source.bytes += static_cast<uint64_t>(size);
-        }
-        if (size < 0)
-            return unreadable(path);
+        content = read_content(*stream->bytes);
+        std::error_code none; // the file was opened by this path, so there is a current folder
+        source.path = fs::absolute(place.file, none).string();
     }
-    source.hash = hash.text();
+    if (!content)
+        return content.error();
+    source.bytes = content->bytes;
+    source.hash = source.content_hash = content->hash;
+    if (is_copied) // the importer finds no other files beside a temporary one
+        return source;
+    Result<std::string> with_others = hash_with_references(*content, place.file);
+    if (!with_others)
+        return with_others.error();
+    source.content_hash = std::move(*with_others);
     return source;
-}
-
-SourceFile::SourceFile(SourceFile&& other) noexcept
-    : path(std::move(other.path)), name(std::move(other.name)), bytes(other.bytes), hash(std::move(other.hash)),
-      descriptor_(std::exchange(other.descriptor_, -1))
-{
-}
-
-SourceFile::~SourceFile()
-{
-    if (descriptor_ >= 0)
-        ::close(descriptor_);
 }
 
 } // namespace trimray

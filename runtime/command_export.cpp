@@ -1,7 +1,7 @@
+#include "format/command_report.h"
 #include "format/pack_reader.h"
 #include "format/pack_writer.h"
 #include "runtime/command_json.h"
-#include "runtime/command_report.h"
 #include "runtime/commands.h"
 #include "runtime/export_gltf.h"
 

@@ -1,4 +1,4 @@
-#include "runtime/command_report.h"
+#include "format/command_report.h"
 #include "runtime/commands.h"
 
 #include <CLI/CLI.hpp>
@@ -18,6 +18,7 @@ const std::vector<ExternalCommand>& external_commands()
 {
     static const std::vector<ExternalCommand> commands = {
         {"pack", "trimray-pack", "Convert a STEP, IGES or BREP model into a scene pack"},
+        {"batch", "trimray-batch", "Convert many models, each in a process of its own, with a ledger"},
         {"bench accuracy", "trimray-measure", "What each digit costs in time and memory, as a report"},
         {"bench speed", "trimray-measure", "Speed beside baselines, and exact counts, against a stored run"},
     };

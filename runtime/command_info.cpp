@@ -1,6 +1,6 @@
+#include "format/command_report.h"
 #include "format/pack_reader.h"
 #include "runtime/command_json.h"
-#include "runtime/command_report.h"
 #include "runtime/commands.h"
 #include "runtime/effect_plan.h"
 #include "runtime/leaf_slopes.h"
@@ -59,7 +59,7 @@ Json info_json(const LoadedPack& pack)
     info["content_id"] = fmt::format("{:016x}", pack.content_id);
     info["compact"] = image.compact;
     info["provenance"] = {{"format", image.provenance.source_format},
-                          {"hash", image.provenance.source_sha_or_xxh},
+                          {"hash", image.provenance.source_hash},
                           {"tool", image.provenance.tool_version},
                           {"options", image.provenance.options_json}};
     return info;
@@ -105,7 +105,7 @@ void print_text(const LoadedPack& pack)
     print_row("pack", fmt::format("version {}{}, {} bytes, content {:016x}", pack_version(pack),
                                   image.compact ? ", compact" : "", pack.file_bytes, pack.content_id));
     print_row("source", fmt::format("{} ({}, in {}, {})", from.source_name, from.source_format, from.source_unit,
-                                    from.source_sha_or_xxh));
+                                    from.source_hash));
     print_row("made by", fmt::format("{} {}", from.tool_version, from.options_json));
     print_row("bounds", fmt::format("({:.6g}, {:.6g}, {:.6g}) to ({:.6g}, {:.6g}, {:.6g}) mm", lo[0], lo[1], lo[2],
                                     hi[0], hi[1], hi[2]));

@@ -1,7 +1,7 @@
+#include "format/command_report.h"
 #include "runtime/command_budget.h"
 #include "runtime/command_draw.h"
 #include "runtime/command_json.h"
-#include "runtime/command_report.h"
 #include "runtime/command_trace.h"
 #include "runtime/command_views.h"
 #include "runtime/commands.h"

@@ -1,6 +1,6 @@
+#include "format/command_report.h"
 #include "format/pack_reader.h"
 #include "format/pack_writer.h"
-#include "runtime/command_report.h"
 #include "runtime/command_trace.h"
 #include "runtime/commands.h"
 #include "runtime/image_io.h"

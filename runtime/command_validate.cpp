@@ -1,7 +1,7 @@
+#include "format/command_report.h"
 #include "format/pack_reader.h"
 #include "format/read_file.h"
 #include "runtime/command_json.h"
-#include "runtime/command_report.h"
 #include "runtime/commands.h"
 
 #include <CLI/CLI.hpp>

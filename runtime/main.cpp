@@ -1,6 +1,6 @@
 // trimray: arguments in, a subcommand's exit code out.
+#include "format/command_report.h"
 #include "format/result.h"
-#include "runtime/command_report.h"
 #include "runtime/commands.h"
 #include "runtime/nearest_word.h"
 

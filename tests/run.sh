@@ -1,6 +1,7 @@
 #!/bin/sh
-# Installs what building and testing needs on Debian 12, builds, and passes all tests; then the tests of the format and
-# the runtime once more under the address and undefined-behaviour sanitizers. usage: tests/run.sh
+# Installs what building and testing needs on Debian 12, builds, and passes all tests; then the tests of the format,
+# the runtime and the reading of model files once more under the address and undefined-behaviour sanitizers.
+# usage: [TRIMRAY_TEST_ENGINES=1] tests/run.sh    (1: installs what tests/engines.txt names as well)
 # The last line is `N passed, N failed`; the exit code is 0 only when nothing failed.
 set -eu
 cd "$(dirname "$0")/.."
@@ -9,8 +10,10 @@ say() { printf '\n== %s\n' "$*"; }
 jobs=${TRIMRAY_JOBS:-$(nproc)}
 
 say "Packages (from packages.txt)"
+lists=packages.txt
+[ "${TRIMRAY_TEST_ENGINES:-0}" = 0 ] || lists="$lists tests/engines.txt"
 missing=
-for package in $(sed 's/#.*//' packages.txt); do
+for package in $(cat $lists | sed 's/#.*//'); do
     dpkg-query -W -f '${Status}' "$package" 2>/dev/null | grep -q 'ok installed' || missing="$missing $package"
 done
 if [ -n "$missing" ]; then
@@ -54,7 +57,7 @@ count_tests() {
 say "Tests"
 count_tests build
 
-say "Sanitizers: format and runtime"
+say "Sanitizers: format, runtime, model files"
 cmake --preset sanitize -DTRIMRAY_PREPROCESS=OFF
 cmake --build build-sanitize -j "$jobs"
 count_tests build-sanitize

@@ -45,7 +45,7 @@ TEST(worker, brings_back_an_answer_of_any_size_unchanged)
     std::string bytes;
     for (int i = 0; i < 3'000'000; ++i)
         bytes += static_cast<char>(i * 37);
-    const auto result = run([&](const WorkerProgress&) { return bytes; });
+    const auto result = run([&](const WorkerReport&) { return bytes; });
     ASSERT_TRUE(result.ok());
     EXPECT_EQ(*result, bytes);
     EXPECT_TRUE(no_children());
@@ -53,7 +53,7 @@ TEST(worker, brings_back_an_answer_of_any_size_unchanged)
 
 TEST(worker, brings_back_an_error_with_its_code_place_and_detail)
 {
-    const auto result = run([](const WorkerProgress&) -> Result<std::string> {
+    const auto result = run([](const WorkerReport&) -> Result<std::string> {
         return Error{ErrorCode::EmptyCad, "file with\na line break", "has\nno faces"};
     });
     ASSERT_FALSE(result.ok());
@@ -66,7 +66,7 @@ TEST(worker, passes_progress_on_in_order)
 {
     std::vector<std::string> seen;
     const auto result = run(
-        [](const WorkerProgress& progress) -> Result<std::string> {
+        [](const WorkerReport& progress) -> Result<std::string> {
             progress("read", -1);
             progress("transfer", 0.25);
             progress("transfer", 1);
@@ -80,7 +80,7 @@ TEST(worker, passes_progress_on_in_order)
 TEST(worker, a_crash_names_the_signal_and_the_phase)
 {
     for (const auto& [signal, name] : {std::pair{SIGSEGV, "SIGSEGV"}, {SIGABRT, "SIGABRT"}, {SIGFPE, "SIGFPE"}}) {
-        const auto result = run([signal = signal](const WorkerProgress& progress) -> Result<std::string> {
+        const auto result = run([signal = signal](const WorkerReport& progress) -> Result<std::string> {
             std::signal(signal, SIG_DFL); // sanitizers have their own handlers
             progress("transfer", 0.5);
             raise(signal);
@@ -97,7 +97,7 @@ TEST(worker, a_hang_ends_at_the_time_limit)
     limits.wall_seconds = 0.3;
     const auto start = std::chrono::steady_clock::now();
     const auto result = run(
-        [](const WorkerProgress& progress) -> Result<std::string> {
+        [](const WorkerReport& progress) -> Result<std::string> {
             progress("read", -1);
             std::signal(SIGTERM, SIG_IGN); // what hangs may ignore polite signals
             for (;;)
@@ -117,7 +117,7 @@ TEST(worker, programs_started_by_a_hanging_worker_end_with_it)
     int ends[2];
     ASSERT_EQ(pipe(ends), 0);
     const auto result = run(
-        [&](const WorkerProgress&) -> Result<std::string> {
+        [&](const WorkerReport&) -> Result<std::string> {
             if (fork() == 0)
                 for (;;)
                     pause(); // holds the pipe's writing end
@@ -138,7 +138,7 @@ TEST(worker, memory_taken_bit_by_bit_ends_at_the_limit)
     WorkerLimits limits;
     limits.memory_bytes = 200u << 20;
     const auto result = run(
-        [](const WorkerProgress& progress) -> Result<std::string> {
+        [](const WorkerReport& progress) -> Result<std::string> {
             progress("transfer", 0.1);
             std::vector<std::vector<char>> hoard;
             for (;;) {
@@ -156,7 +156,7 @@ TEST(worker, an_allocation_above_the_limit_is_out_of_memory_too)
     WorkerLimits limits;
     limits.memory_bytes = 200u << 20;
     const auto result = run(
-        [](const WorkerProgress&) -> Result<std::string> {
+        [](const WorkerReport&) -> Result<std::string> {
             const std::vector<char> huge(8ull << 30, 'x');
             return std::to_string(huge.size());
         },
@@ -167,7 +167,7 @@ TEST(worker, an_allocation_above_the_limit_is_out_of_memory_too)
 
 TEST(worker, being_killed_from_outside_is_reported_as_such)
 {
-    const auto result = run([](const WorkerProgress&) -> Result<std::string> {
+    const auto result = run([](const WorkerReport&) -> Result<std::string> {
         kill(getpid(), SIGKILL);
         return std::string();
     });
@@ -176,14 +176,14 @@ TEST(worker, being_killed_from_outside_is_reported_as_such)
 
 TEST(worker, ending_without_an_answer_is_an_error)
 {
-    const auto result = run([](const WorkerProgress&) -> Result<std::string> { _exit(3); });
+    const auto result = run([](const WorkerReport&) -> Result<std::string> { _exit(3); });
     expect_error(result, ErrorCode::Internal, "status 3 without an answer");
 }
 
 TEST(worker, an_exception_becomes_an_error)
 {
     const auto result =
-        run([](const WorkerProgress&) -> Result<std::string> { throw std::runtime_error("lost a face"); });
+        run([](const WorkerReport&) -> Result<std::string> { throw std::runtime_error("lost a face"); });
     ASSERT_FALSE(result.ok());
     EXPECT_EQ(result.error().code, ErrorCode::Internal);
     EXPECT_THAT(result.error().detail, HasSubstr("lost a face"));
@@ -193,7 +193,7 @@ TEST(worker, its_stdout_is_swallowed_and_its_stderr_is_not)
 {
     testing::internal::CaptureStdout();
     testing::internal::CaptureStderr();
-    const auto result = run([](const WorkerProgress&) -> Result<std::string> {
+    const auto result = run([](const WorkerReport&) -> Result<std::string> {
         std::printf("chatter of the kernel\n");
         std::fflush(stdout);
         std::fprintf(stderr, "a message\n");
@@ -206,7 +206,7 @@ TEST(worker, its_stdout_is_swallowed_and_its_stderr_is_not)
 
 TEST(worker, leaves_no_core_and_has_its_own_process_group)
 {
-    const auto result = run([](const WorkerProgress&) -> Result<std::string> {
+    const auto result = run([](const WorkerReport&) -> Result<std::string> {
         rlimit core{};
         getrlimit(RLIMIT_CORE, &core);
         return std::to_string(core.rlim_cur) + (getpgid(0) == getpid() ? " own group" : " shared group");
@@ -222,7 +222,7 @@ TEST(worker, dies_with_its_parent)
     const pid_t middle = fork();
     if (middle == 0) { // a process that runs a worker and is killed meanwhile
         close(ends[0]);
-        const auto ignored = run([&](const WorkerProgress&) -> Result<std::string> {
+        const auto ignored = run([&](const WorkerReport&) -> Result<std::string> {
             kill(getppid(), SIGKILL);
             for (;;)
                 pause();

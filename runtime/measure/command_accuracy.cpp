@@ -1,6 +1,6 @@
 // What each digit costs on given models, as a report.
+#include "format/command_report.h"
 #include "format/pack_writer.h"
-#include "runtime/command_report.h"
 #include "runtime/command_trace.h"
 #include "runtime/measure/commands.h"
 #include "runtime/measure/report.h"

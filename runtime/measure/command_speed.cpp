@@ -1,7 +1,7 @@
 // How fast given models are, beside baselines and a stored run.
+#include "format/command_report.h"
 #include "format/pack_writer.h"
 #include "format/read_file.h"
-#include "runtime/command_report.h"
 #include "runtime/command_trace.h"
 #include "runtime/measure/commands.h"
 #include "runtime/measure/report.h"

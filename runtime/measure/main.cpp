@@ -1,5 +1,6 @@
 // trimray-measure: `trimray bench accuracy` and `bench speed` run it, as `trimray-measure accuracy` and `... speed`.
-#include "runtime/command_report.h"
+#include "format/command_report.h"
+#include "format/shell_word.h"
 #include "runtime/measure/commands.h"
 
 #include <CLI/CLI.hpp>
@@ -9,19 +10,6 @@
 
 namespace {
 using namespace trimray;
-
-/// As a shell takes it.
-std::string shell_word(const std::string& word)
-{
-    const bool plain = !word.empty() && word.find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ"
-                                                               "0123456789_-./,=:%+@") == std::string::npos;
-    if (plain)
-        return word;
-    std::string out = "'";
-    for (const char c : word)
-        out += c == '\'' ? std::string("'\\''") : std::string(1, c);
-    return out + '\'';
-}
 
 std::string command_line(int argc, char** argv)
 {

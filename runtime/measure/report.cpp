@@ -1,5 +1,6 @@
 #include "runtime/measure/report.h"
 
+#include "format/page.h"
 #include "runtime/measure/csv.h"
 #include "runtime/median.h"
 
@@ -44,22 +45,6 @@ const char* compiler()
 Json number(double value) // JSON has no infinity: an equal picture has null decibels
 {
     return std::isfinite(value) ? Json(value) : Json();
-}
-
-/// A PNG as a page holds it (RFC 2397, RFC 4648).
-std::string data_uri(std::span<const std::byte> png)
-{
-    constexpr std::string_view kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    std::string uri = "data:image/png;base64,";
-    for (size_t i = 0; i < png.size(); i += 3) {
-        const size_t count = std::min<size_t>(3, png.size() - i);
-        uint32_t word = 0;
-        for (size_t k = 0; k < 3; ++k)
-            word = word << 8 | (k < count ? uint32_t(png[i + k]) : 0);
-        for (size_t k = 0; k < 4; ++k)
-            uri += k <= count ? kDigits[word >> (18 - 6 * k) & 63] : '=';
-    }
-    return uri;
 }
 
 double per_ray(uint64_t count, const WorkCounts& work)
@@ -210,15 +195,6 @@ Json pictures_json(const AccuracyReport& report)
     return object;
 }
 
-/// Puts JSON where the page has a place for it. "</script>" in a name must not end the script that it is in.
-void fill_in(std::string_view place, const Json& json, std::string& page)
-{
-    std::string text;
-    for (const char c : json.dump(-1, ' ', false, Json::error_handler_t::replace))
-        text += c == '<' ? std::string("\\u003c") : std::string(1, c);
-    page.replace(page.find(place), place.size(), text);
-}
-
 } // namespace
 
 double times_spread(const AccuracyReport& report)
@@ -257,7 +233,7 @@ Json report_json(const AccuracyReport& report)
 
 std::string report_html(const AccuracyReport& report)
 {
-    std::string page = kPage;
+    std::string page = page_of(kPage);
     fill_in("@REPORT@", report_json(report), page);
     fill_in("@PICTURES@", pictures_json(report), page);
     return page;

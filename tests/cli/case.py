@@ -33,10 +33,10 @@ def prepare(options, folder):
         sys.exit(f"the test's model cannot be packed: {done.stderr}")
 
 
-def run(*arguments, env=None, cwd=None, program="trimray"):
+def run(*arguments, env=None, cwd=None, program="trimray", timeout=120):
     """The finished process, its output as text."""
     command = [str(OPTIONS.bin / program), *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=120, env=env, cwd=cwd, check=False)
+    return subprocess.run(command, capture_output=True, text=True, timeout=timeout, env=env, cwd=cwd, check=False)
 
 
 class CliTest(unittest.TestCase):

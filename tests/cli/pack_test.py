@@ -1,3 +1,6 @@
+import gzip
+import zipfile
+
 from case import MODEL, PACK, WORK, CliTest, run
 
 
@@ -36,6 +39,25 @@ class Pack(CliTest):
     def test_the_same_model_gives_the_same_bytes(self):
         self.ok("pack", MODEL, "-o", WORK / "same.tray")
         self.assertEqual(PACK.read_bytes(), (WORK / "same.tray").read_bytes())
+
+    def test_a_compressed_or_archived_model_gives_the_same_bytes(self):
+        content, archive, out = MODEL.read_bytes(), WORK / "parts.zip", WORK / "packed.tray"
+        compressed = WORK / (MODEL.name + ".gz")
+        compressed.write_bytes(gzip.compress(content))
+        with zipfile.ZipFile(archive, "w", zipfile.ZIP_DEFLATED) as members:
+            members.writestr("notes.txt", "beside the models")
+            members.writestr(f"cars/{MODEL.name}", content)
+        for model in [compressed, archive, f"{archive}!/cars/{MODEL.name}"]:
+            report = self.json_of("pack", model, "-o", out, "--json")
+            self.assertEqual((report["source"], report["source_bytes"]), (MODEL.name, len(content)))
+            self.assertEqual(out.read_bytes(), PACK.read_bytes(), model)
+        source = self.json_of("info", out, "--json")["provenance"]
+        self.assertRegex(source["hash"], "^xxh3-128:[0-9a-f]{32}$")
+        with zipfile.ZipFile(archive, "a") as members:
+            members.writestr("bolt.step", "another")
+        self.fails(1, "pack", archive, "-o", out, says=["holds 2 CAD files", f"{archive}!/bolt.step"])
+        self.fails(2, "pack", f"{archive}!/nut.step", "-o", out, says=["nut.step", "no such member"])
+        self.fails(1, "pack", f"{archive}!/bolt.step", "-o", archive, says=["is the model itself"])
 
     def test_writes_a_mesh_in_a_packs_place(self):
         out = WORK / "model.trimesh"

@@ -4,7 +4,7 @@ import subprocess
 
 from case import OPTIONS, WORK, CliTest, run
 
-COMMANDS = ["pack", "render", "info", "validate", "thumbnail", "export", "preview", "bench", "version"]
+COMMANDS = ["pack", "batch", "render", "info", "validate", "thumbnail", "export", "preview", "bench", "version"]
 
 
 class Usage(CliTest):
@@ -16,7 +16,7 @@ class Usage(CliTest):
 
     def test_every_command_explains_itself_with_an_example(self):
         for command in COMMANDS:
-            if command == "pack" and not OPTIONS.has_pack:
+            if command in ["pack", "batch"] and not OPTIONS.has_pack:
                 continue
             text = self.ok(command, "--help").stdout
             self.assertIn("Example", text, command)

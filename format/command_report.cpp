@@ -1,4 +1,4 @@
-#include "runtime/command_report.h"
+#include "format/command_report.h"
 
 #include <fmt/format.h>
 
@@ -20,16 +20,16 @@ std::string printable(std::string_view text)
     return line;
 }
 
-int report_error(const Error& error)
+int report_error(const Error& error, std::string_view program)
 {
     const std::string where = error.where.empty() ? "" : printable(error.where) + ": ";
-    fmt::print(stderr, "trimray: {}{} [E{}]\n", where, printable(error.detail), static_cast<int>(error.code));
+    fmt::print(stderr, "{}: {}{} [E{}]\n", program, where, printable(error.detail), static_cast<int>(error.code));
     return exit_code(error);
 }
 
-void report_note(std::string_view text)
+void report_note(std::string_view text, std::string_view program)
 {
-    fmt::print(stderr, "trimray: {}\n", printable(text));
+    fmt::print(stderr, "{}: {}\n", program, printable(text));
 }
 
 void report_progress(std::string_view text)

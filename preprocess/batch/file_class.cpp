@@ -1,0 +1,88 @@
+#include "preprocess/batch/file_class.h"
+
+namespace trimray {
+
+const char* class_name(FileClass kind)
+{
+    switch (kind) {
+    case FileClass::Done:
+        break;
+    case FileClass::Incomplete:
+        return "incomplete";
+    case FileClass::Invalid:
+        return "invalid";
+    case FileClass::Unsupported:
+        return "unsupported";
+    case FileClass::Timeout:
+        return "timeout";
+    case FileClass::Memory:
+        return "memory";
+    case FileClass::Crash:
+        return "crash";
+    case FileClass::Io:
+        return "io";
+    }
+    return "done";
+}
+
+std::optional<FileClass> class_named(std::string_view name)
+{
+    for (const FileClass kind : kFileClasses)
+        if (name == class_name(kind))
+            return kind;
+    return std::nullopt;
+}
+
+FileClass class_of(const Error& error)
+{
+    switch (error.code) {
+    case ErrorCode::KernelTimedOut:
+        return FileClass::Timeout;
+    case ErrorCode::KernelOutOfMemory:
+        return FileClass::Memory;
+    case ErrorCode::KernelWroteTooMuch:
+        return FileClass::Io;
+    default:
+        break;
+    }
+    switch (exit_code(error)) {
+    case kExitIo:
+        return FileClass::Io;
+    case kExitInvalid:
+        return FileClass::Invalid;
+    case kExitUnsupported:
+        return FileClass::Unsupported;
+    default:
+        return FileClass::Crash;
+    }
+}
+
+ExitCode exit_code(FileClass kind)
+{
+    switch (kind) {
+    case FileClass::Done:
+        return kExitOk;
+    case FileClass::Incomplete:
+        return kExitPartial;
+    case FileClass::Invalid:
+        return kExitInvalid;
+    case FileClass::Unsupported:
+        return kExitUnsupported;
+    case FileClass::Io:
+        return kExitIo;
+    default:
+        return kExitInternal;
+    }
+}
+
+bool has_pack(FileClass kind)
+{
+    return kind == FileClass::Done || kind == FileClass::Incomplete;
+}
+
+bool worth_a_retry(FileClass kind)
+{
+    return kind == FileClass::Crash || kind == FileClass::Timeout;
+}
+
+} // namespace trimray

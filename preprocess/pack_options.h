@@ -1,0 +1,54 @@
+// The options of a conversion, as `trimray pack` and `trimray batch` take them.
+#pragma once
+
+#include "format/result.h"
+#include "preprocess/build_pack.h"
+#include "preprocess/cad_import.h"
+#include "preprocess/worker.h"
+
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace CLI {
+class App;
+class Option;
+} // namespace CLI
+
+namespace trimray {
+
+struct PackOptions {
+    ImportOptions import;
+    BuildOptions build;
+    bool previews = true;
+};
+
+/// The words of a command line, before they are understood.
+struct PackWords {
+    PackOptions options; // those that need no second look
+    std::string surfaces = "native", source = "curve", layout = "isotropic", trim_memory = "100%";
+    bool no_previews = false;
+};
+
+/// Adds the options that decide what a pack holds; returns them. `words` lives as long as `app`.
+std::vector<CLI::Option*> add_pack_options(CLI::App& app, PackWords& words);
+
+/// Fails: Usage.
+Result<PackOptions> understand(const PackWords& words);
+
+/// The limits of a conversion as words. The defaults are WorkerLimits'.
+struct LimitWords {
+    double timeout_seconds = WorkerLimits{}.wall_seconds;
+    std::string memory = "8GiB", disk = "0";
+};
+std::vector<CLI::Option*> add_limit_options(CLI::App& app, LimitWords& words);
+/// Fails: Usage.
+Result<WorkerLimits> understand(const LimitWords& words);
+
+/// "8MiB", "4GB", "1048576" -> bytes.
+std::optional<double> parse_bytes(const std::string& text);
+
+/// The options that change a pack's content, as JSON, for its provenance.
+std::string provenance_options(const PackOptions& options);
+
+} // namespace trimray
