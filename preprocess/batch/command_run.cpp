@@ -205,11 +205,19 @@ Result<int> run(RunArguments arguments, const std::vector<std::string>& words)
     if (!ledger)
         return ledger.error();
     std::vector<BatchFile> files = inputs->files;
+    size_t skipped_not_done = 0; // settled by runs before, and not as it should be
     if (arguments.resume || !retry->empty()) {
         const auto states = read_states(store->ledger_folder());
         if (!states)
             return states.error();
         files = unsettled(std::move(files), *store, options.basis, *retry, *states);
+        std::set<std::string> left;
+        for (const BatchFile& file : files)
+            left.insert(file.name);
+        skipped_not_done =
+            static_cast<size_t>(std::count_if(inputs->files.begin(), inputs->files.end(), [&](const BatchFile& file) {
+                return left.count(file.name) == 0 && states->at(file.name).kind != FileClass::Done;
+            }));
     }
     const size_t skipped = inputs->files.size() - files.size();
     uint64_t bytes = 0;
@@ -257,8 +265,8 @@ Result<int> run(RunArguments arguments, const std::vector<std::string>& words)
     if (result->stopped)
         return 128 + static_cast<int>(stop_signal);
     const auto done = result->counts.find(FileClass::Done);
-    const bool all =
-        inputs->unreadable.empty() && (done == result->counts.end() ? files.empty() : done->second == files.size());
+    const bool all = inputs->unreadable.empty() && skipped_not_done == 0 &&
+                     (done == result->counts.end() ? files.empty() : done->second == files.size());
     return all ? kExitOk : kExitPartial;
 }
 
