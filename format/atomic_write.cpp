@@ -98,7 +98,7 @@ void sweep_stale_temporaries(const std::string& path)
     }
 }
 
-Status write_file_atomically(const std::string& path, const std::vector<std::byte>& bytes)
+Status write_file_atomically(const std::string& path, const std::vector<std::byte>& bytes, Durability durability)
 {
     const fs::path target(path);
     if (!target.has_filename())
@@ -116,12 +116,12 @@ Status write_file_atomically(const std::string& path, const std::vector<std::byt
         return not_writable(target, "create a temporary file beside it", errno);
     if (const int failed = write_all(temporary.descriptor, bytes))
         return not_writable(target, "write", failed);
-    if (::fsync(temporary.descriptor) != 0)
+    if (durability == Durability::Synced && ::fsync(temporary.descriptor) != 0)
         return not_writable(target, "fsync", errno);
     if (::rename(temporary.path.c_str(), target.c_str()) != 0)
         return not_writable(target, "rename", errno);
     temporary.renamed = true;
-    if (const int failed = sync_folder(folder_of(target)))
+    if (const int failed = durability == Durability::Synced ? sync_folder(folder_of(target)) : 0)
         return not_writable(target, "fsync of its folder", failed);
     return Done{};
 }

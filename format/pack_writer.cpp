@@ -47,7 +47,8 @@ using Compressor = std::unique_ptr<ZSTD_CCtx, size_t (*)(ZSTD_CCtx*)>;
 /// One zstd frame that states its content size.
 Bytes compress_frame(ByteSpan content, int level)
 {
-    const Compressor context(ZSTD_createCCtx(), ZSTD_freeCCtx);
+    // kept: a new one clears its tables, which takes longer than compressing what most sections hold
+    thread_local const Compressor context(ZSTD_createCCtx(), ZSTD_freeCCtx);
     Bytes frame(ZSTD_compressBound(content.size()));
     const size_t size =
         ZSTD_compressCCtx(context.get(), frame.data(), frame.size(), content.data(), content.size(), level);

@@ -88,7 +88,8 @@ Status add_previews(PackImage& image, const std::string& trimray_program)
         return Error{ErrorCode::FileNotWritable, "temporary folder", "no preview: no temporary folder could be made"};
     const fs::path pack = folder.path() / "scene.tray";
     constexpr int kPlain = 0; // the file lives for a second: no time for compression
-    if (const Status written = write_file_atomically(pack.string(), encode_pack(image, {kPlain})); !written.ok())
+    if (const Status written = write_file_atomically(pack.string(), encode_pack(image, {kPlain}), Durability::Unsynced);
+        !written.ok())
         return written.error();
     const int status =
         run_quietly(trimray_program, {"preview", pack.string(), "-o", (folder.path() / "preview").string()});

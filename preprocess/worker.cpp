@@ -28,7 +28,10 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr auto kTreePeriod = std::chrono::milliseconds(250); // between looks at what workers have started
+// Between looks at a worker's limits. However far it is from them, others may have to wait for what it left.
+constexpr auto kShortestLook = std::chrono::milliseconds(25), kLongestLook = std::chrono::milliseconds(500);
+constexpr auto kTreePeriod = std::chrono::milliseconds(250); // between looks at who started whom
+constexpr double kFastestGrowth = 16e9; // bytes that all threads of a worker may take, or write, in a second
 constexpr uint64_t kHardMemorySlack = 512ull << 20; // the kernel swallows failed allocations and goes on with a
                                                     // part of the model, so the hard limit lies above the watched one
 constexpr int kArenas = 4;                          // of malloc; each reserves 64 MiB, and the default is 8 a core
@@ -162,7 +165,7 @@ Result<Worker> Worker::start(const std::string& what, const WorkerFunction& func
     worker.limits_ = limits;
     worker.progress_ = progress;
     worker.start_ = Clock::now();
-    worker.next_tree_ = worker.start_ + kTreePeriod;
+    worker.next_look_ = worker.start_ + kShortestLook;
     worker.messages_ = ends[0];
     const pid_t parent = getpid();
     worker.child_ = fork();
@@ -193,7 +196,7 @@ Worker& Worker::operator=(Worker&& other) noexcept
     std::swap(messages_, other.messages_);
     std::swap(ended_, other.ended_);
     std::swap(start_, other.start_);
-    std::swap(next_tree_, other.next_tree_);
+    std::swap(next_look_, other.next_look_);
     std::swap(pending_, other.pending_);
     std::swap(phase_, other.phase_);
     std::swap(note_, other.note_);
@@ -315,34 +318,49 @@ void Worker::take_message(char type, std::string payload)
     }
 }
 
+/// Holds the worker and all it has started against the limits together.
 void Worker::watch_limits()
 {
+    const auto now = Clock::now();
+    if (now < next_look_)
+        return;
+    next_look_ = now + (ended_ >= 0 ? kLongestLook : kShortestLook); // without a descriptor its end shows at looks only
     if (stopped_)
         return;
-    if (limits_.wall_seconds > 0 && seconds() > limits_.wall_seconds)
-        stop({ErrorCode::KernelTimedOut, what_,
-              fmt::format("took longer than {} s{}; raise --timeout or simplify the model", limits_.wall_seconds,
-                          in_phase())});
-    else if (limits_.memory_bytes > 0 && !kSanitized && resident_bytes(child_) > limits_.memory_bytes)
-        stop({ErrorCode::KernelOutOfMemory, what_, memory_detail()});
-    else if (Clock::now() >= next_tree_)
-        watch_tree();
-}
-
-/// Holds the worker and all it has started against the limits together.
-void Worker::watch_tree()
-{
-    next_tree_ = Clock::now() + kTreePeriod;
+    if (limits_.wall_seconds > 0) {
+        const auto end = start_ + std::chrono::duration_cast<Clock::duration>(
+                                      std::chrono::duration<double>(std::min(limits_.wall_seconds, 1e9)));
+        if (now >= end)
+            return stop({ErrorCode::KernelTimedOut, what_,
+                         fmt::format("took longer than {} s{}; raise --timeout or simplify the model",
+                                     limits_.wall_seconds, in_phase())});
+        next_look_ = std::min(next_look_, end);
+    }
     uint64_t resident = 0, written = 0;
     for (const pid_t pid : recent_processes().tree_of(child_)) {
         resident += resident_bytes(pid);
         written += written_bytes(pid);
     }
-    if (limits_.memory_bytes > 0 && !kSanitized && resident > limits_.memory_bytes)
-        stop({ErrorCode::KernelOutOfMemory, what_, memory_detail()});
-    else if (limits_.written_bytes > 0 && written > limits_.written_bytes)
-        stop({ErrorCode::KernelWroteTooMuch, what_,
-              fmt::format("wrote more than {}{}; raise --disk-limit", bytes_text(limits_.written_bytes), in_phase())});
+    if (limits_.memory_bytes > 0 && !kSanitized) {
+        if (resident > limits_.memory_bytes)
+            return stop({ErrorCode::KernelOutOfMemory, what_, memory_detail()});
+        look_again_before(resident, limits_.memory_bytes);
+    }
+    if (limits_.written_bytes > 0) {
+        if (written > limits_.written_bytes)
+            return stop({ErrorCode::KernelWroteTooMuch, what_,
+                         fmt::format("wrote more than {}{}; raise --disk-limit", bytes_text(limits_.written_bytes),
+                                     in_phase())});
+        look_again_before(written, limits_.written_bytes);
+    }
+}
+
+/// However fast it grows.
+void Worker::look_again_before(uint64_t used, uint64_t limit)
+{
+    const auto left = std::chrono::duration<double>(static_cast<double>(limit - used) / kFastestGrowth);
+    const auto wait = std::max<Clock::duration>(kShortestLook, std::chrono::duration_cast<Clock::duration>(left));
+    next_look_ = std::min(next_look_, Clock::now() + wait);
 }
 
 std::string Worker::in_phase() const
@@ -395,6 +413,12 @@ Result<std::string> Worker::answer_of(int status)
                              signal_, in_phase(), frame_.empty() ? "" : fmt::format(" in {}", frame_))};
 }
 
+int poll_timeout(Clock::time_point moment)
+{
+    const auto left = std::chrono::ceil<std::chrono::milliseconds>(moment - Clock::now()).count();
+    return static_cast<int>(std::clamp<std::int64_t>(left, 0, 60'000));
+}
+
 Result<std::string> run_in_worker(const std::string& what, const WorkerFunction& function, const WorkerLimits& limits,
                                   const WorkerProgress& progress)
 {
@@ -409,7 +433,7 @@ Result<std::string> run_in_worker(const std::string& what, const WorkerFunction&
         }
         std::array<pollfd, 2> waiting{pollfd{worker->message_descriptor(), POLLIN, 0},
                                       pollfd{worker->end_descriptor(), POLLIN, 0}};
-        ::poll(waiting.data(), waiting.size(), kWorkerPollMs);
+        ::poll(waiting.data(), waiting.size(), poll_timeout(worker->next_look()));
     }
 }
 

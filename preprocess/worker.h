@@ -71,13 +71,16 @@ public:
     int message_descriptor() const { return messages_; }
     int end_descriptor() const { return ended_; }
 
-    /// Takes what the worker has sent, holds it against its limits, and says how it ended once it has. Call it every
-    /// kWorkerPollMs, or when a descriptor is readable. Once it has ended, nothing is left of what was in its process
-    /// group; what left that falls to this process (end_orphans).
+    /// Takes what the worker has sent, holds it against its limits, and says how it ended once it has. Call it when a
+    /// descriptor is readable, and at `next_look` at the latest. Once it has ended, nothing is left of what was in its
+    /// process group; what left that falls to this process (end_orphans).
     std::optional<WorkerEnd> poll();
 
     /// Ends the worker; `poll` will say why.
     void stop(const Error& why);
+
+    /// When its limits have to be looked at again: the further it is from them, the later.
+    std::chrono::steady_clock::time_point next_look() const { return next_look_; }
 
     const std::string& phase() const { return phase_; }
     double seconds() const;
@@ -87,7 +90,7 @@ private:
     bool read_messages();
     void take_message(char type, std::string payload);
     void watch_limits();
-    void watch_tree();
+    void look_again_before(uint64_t used, uint64_t limit);
     void end_group() const;
     WorkerEnd end_of(int status, double cpu_seconds, uint64_t peak_memory_bytes);
     Result<std::string> answer_of(int status);
@@ -100,13 +103,14 @@ private:
     WorkerProgress progress_;
     pid_t child_ = -1;
     int messages_ = -1, ended_ = -1;
-    Clock::time_point start_{}, next_tree_{};
+    Clock::time_point start_{}, next_look_{};
     std::string pending_, phase_, note_, signal_, frame_;
     std::optional<Result<std::string>> answer_;
     std::optional<Error> stopped_;
 };
 
-inline constexpr int kWorkerPollMs = 25; // how soon limits are noticed
+/// The timeout for poll(2) that ends at a moment, in milliseconds.
+int poll_timeout(std::chrono::steady_clock::time_point moment);
 
 /// Runs one function in a worker to its end; none of what it started is left when this returns. Call it in a process
 /// without other children and threads. `progress` is called here with what the child reports.

@@ -52,7 +52,7 @@ Status write_png(const std::string& path, const Picture& picture, PngForm form =
     const Result<std::vector<std::byte>> bytes = encode_png(picture, form);
     if (!bytes.ok())
         return bytes.error();
-    return write_file_atomically(path, *bytes);
+    return write_file_atomically(path, *bytes, Durability::Unsynced); // the pack has it still
 }
 
 /// The smallest stored preview that is no smaller than `size`, else the largest; empty where the pack has none.

@@ -33,6 +33,14 @@ struct Running {
     Worker worker;
 };
 
+double own_cpu_seconds()
+{
+    rusage own{};
+    getrusage(RUSAGE_SELF, &own);
+    return static_cast<double>(own.ru_utime.tv_sec + own.ru_stime.tv_sec) +
+           1e-6 * static_cast<double>(own.ru_utime.tv_usec + own.ru_stime.tv_usec);
+}
+
 class Supervisor {
 public:
     Supervisor(const std::vector<BatchFile>& files, const Store& store, const LedgerWriter& ledger,
@@ -70,10 +78,7 @@ public:
         for (const auto& [kind, count] : result_.counts)
             ended += count;
         result_.left = files_.size() - ended;
-        rusage own{};
-        getrusage(RUSAGE_SELF, &own);
-        result_.supervisor_cpu_seconds = static_cast<double>(own.ru_utime.tv_sec + own.ru_stime.tv_sec) +
-                                         1e-6 * static_cast<double>(own.ru_utime.tv_usec + own.ru_stime.tv_usec);
+        result_.supervisor_cpu_seconds = own_cpu_seconds() - start_cpu_seconds_;
         return result_;
     }
 
@@ -139,7 +144,12 @@ private:
         for (const Running& running : running_)
             for (const int descriptor : {running.worker.message_descriptor(), running.worker.end_descriptor()})
                 waiting.push_back({descriptor, POLLIN, 0});
-        poll(waiting.data(), waiting.size(), kWorkerPollMs);
+        Clock::time_point until = next_watcher_call_;
+        if (!waiting_.empty())
+            until = std::min(until, next_busy_look_);
+        for (const Running& running : running_)
+            until = std::min(until, running.worker.next_look());
+        poll(waiting.data(), waiting.size(), poll_timeout(until));
     }
 
     void end_some()
@@ -254,6 +264,7 @@ private:
     std::deque<Attempt> queue_, waiting_;
     std::vector<Running> running_;
     BatchResult result_;
+    double start_cpu_seconds_ = own_cpu_seconds();
     std::optional<Error> failed_;
     Clock::time_point next_busy_look_{}, next_orphan_look_{}, next_watcher_call_{};
 };
