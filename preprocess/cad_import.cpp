@@ -169,7 +169,7 @@ std::string kernel_version()
 
 Result<CadModel> import_cad(const std::string& path, const ImportOptions& options, const Progress& progress)
 {
-    const Result<kernel::CadFormat> format = kernel::detect_format(path);
+    const Result<kernel::CadFormat> format = kernel::detect_format(path, options.file_name);
     if (!format)
         return format.error();
     const kernel::QuietKernel quiet;

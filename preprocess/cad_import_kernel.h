@@ -58,9 +58,9 @@ struct LoadedFile {
 
 enum class CadFormat { Step, Iges, BrepText, BrepBinary };
 
-/// Tells a file's format by its first bytes, then by its name.
+/// Tells a file's format by its first bytes; what it is called (empty: as in `path`) is for the error.
 /// Fails: FileNotFound, FileNotReadable, EmptyCad, UnsupportedFormat (says what the file looks like).
-Result<CadFormat> detect_format(const std::string& path);
+Result<CadFormat> detect_format(const std::string& path, const std::string& file_name);
 
 /// Reads and transfers a file. Fails as import_cad.
 Result<LoadedFile> load_file(const std::string& path, CadFormat format, const ImportOptions& options,

@@ -264,7 +264,7 @@ void note_lost_faces(const STEPControl_Reader& reader, LoadedFile& file)
 
 std::string model_name(const std::string& path, const ImportOptions& options)
 {
-    return options.name.empty() ? std::filesystem::path(path).stem().string() : options.name;
+    return std::filesystem::path(options.file_name.empty() ? path : options.file_name).stem().string();
 }
 
 Result<LoadedFile> load_step(const std::string& path, const ImportOptions& options, const Progress& progress)
@@ -403,7 +403,7 @@ Result<LoadedFile> load_brep(const std::string& path, CadFormat format, const Im
 
 } // namespace
 
-Result<CadFormat> detect_format(const std::string& path)
+Result<CadFormat> detect_format(const std::string& path, const std::string& file_name)
 {
     const Result<FileEnds> ends = read_ends(path);
     if (!ends)
@@ -444,7 +444,7 @@ Result<CadFormat> detect_format(const std::string& path)
         if (head.compare(0, magic.size(), magic) == 0)
             return Error{ErrorCode::UnsupportedFormat, path, fmt::format("is {}", what)};
 
-    if (const std::optional<CadFamily> claimed = cad_family(path))
+    if (const std::optional<CadFamily> claimed = cad_family(file_name.empty() ? path : file_name))
         return Error{
             ErrorCode::InvalidCad, path,
             fmt::format("is not {}: it begins with \"{}\"; export it again", signs_of(*claimed), sample_of(head))};

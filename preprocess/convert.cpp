@@ -117,7 +117,7 @@ Json finding_counts(const std::vector<FaceFinding>& findings)
 Result<CadModel> import_model(const ConvertJob& job, const SourceFile& source, const WorkerProgress& progress)
 {
     ImportOptions import = job.options.import;
-    import.name = source.name.substr(0, source.name.find_last_of('.'));
+    import.file_name = source.name;
     Result<CadModel> model = import_cad(source.path, import, progress);
     if (model)
         return model;

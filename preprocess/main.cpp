@@ -83,7 +83,7 @@ Result<std::optional<Options>> parse_options(int argc, char** argv)
     const Result<PackOptions> understood = understand(words);
     if (!understood)
         return understood.error();
-    const Result<WorkerLimits> limited = understand(limits);
+    const Result<WorkerLimits> limited = understand(limits, 1);
     if (!limited)
         return limited.error();
     options.job.options = *understood;

@@ -1,8 +1,10 @@
 #include "preprocess/pack_options.h"
 
 #include "format/pack_file.h"
+#include "preprocess/machine_memory.h"
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <fmt/format.h>
@@ -104,20 +106,65 @@ Result<PackOptions> understand(const PackWords& words)
     return options;
 }
 
-std::vector<CLI::Option*> add_limit_options(CLI::App& app, LimitWords& words)
+std::vector<std::string> said_words(const std::vector<CLI::Option*>& options)
 {
-    return {app.add_option("--timeout", words.timeout_seconds, "Seconds the conversion of a file may take; 0: no limit")
-                ->check(CLI::NonNegativeNumber)
-                ->capture_default_str(),
-            app.add_option("--memory-limit", words.memory, "Memory it may use, as 8GiB; 0: no limit")
-                ->capture_default_str(),
-            app.add_option("--disk-limit", words.disk, "What it may write, temporary files too, as 64GiB; 0: no limit")
-                ->capture_default_str()};
+    std::vector<std::string> words;
+    for (const CLI::Option* option : options) {
+        if (option->count() == 0)
+            continue;
+        words.push_back(option->get_name());
+        if (option->get_expected_min() > 0)
+            words.push_back(option->results().back());
+    }
+    return words;
 }
 
-Result<WorkerLimits> understand(const LimitWords& words)
+std::vector<std::string> overridden_words(const std::vector<std::string>& base, const std::vector<std::string>& over)
 {
-    const Result<uint64_t> memory = parse_limit("--memory-limit", words.memory);
+    std::vector<std::string> words;
+    bool kept = true;
+    for (const std::string& word : base) {
+        if (word.starts_with("--"))
+            kept = std::find(over.begin(), over.end(), word) == over.end();
+        if (kept)
+            words.push_back(word);
+    }
+    words.insert(words.end(), over.begin(), over.end());
+    return words;
+}
+
+Result<PackOptions> understand_words(const std::vector<std::string>& words)
+{
+    CLI::App parser;
+    PackWords understood;
+    add_pack_options(parser, understood);
+    try {
+        parser.parse(std::vector<std::string>(words.rbegin(), words.rend())); // takes its arguments last first
+    } catch (const CLI::ParseError& error) {
+        return Error{ErrorCode::Usage, "", error.what()};
+    }
+    return understand(understood);
+}
+
+void add_limit_options(CLI::App& app, LimitWords& words)
+{
+    app.add_option("--timeout", words.timeout_seconds, "Seconds the conversion of a file may take; 0: no limit")
+        ->check(CLI::NonNegativeNumber)
+        ->capture_default_str();
+    app.add_option("--memory-limit", words.memory,
+                   "Memory it may use, as 8GiB; auto: the machine's, shared among the files at work, but 2 to 8 GiB; "
+                   "0: no limit")
+        ->capture_default_str();
+    app.add_option("--disk-limit", words.disk, "What it may write, temporary files too, as 64GiB; 0: no limit")
+        ->capture_default_str();
+}
+
+Result<WorkerLimits> understand(const LimitWords& words, int jobs)
+{
+    constexpr uint64_t kLeast = 2ull << 30, kMost = 8ull << 30;
+    const Result<uint64_t> memory = words.memory == "auto"
+                                        ? std::clamp(machine_memory() / static_cast<uint64_t>(jobs), kLeast, kMost)
+                                        : parse_limit("--memory-limit", words.memory);
     if (!memory)
         return memory.error();
     const Result<uint64_t> disk = parse_limit("--disk-limit", words.disk);

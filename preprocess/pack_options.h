@@ -36,14 +36,23 @@ std::vector<CLI::Option*> add_pack_options(CLI::App& app, PackWords& words);
 /// Fails: Usage.
 Result<PackOptions> understand(const PackWords& words);
 
-/// The limits of a conversion as words. The defaults are WorkerLimits'.
+/// What was said of such options, to say it again: {"--leaf-budget", "8", "--heal"}.
+std::vector<std::string> said_words(const std::vector<CLI::Option*>& options);
+
+/// `base`, but for the options that are also in `over`, and `over`; both as said_words.
+std::vector<std::string> overridden_words(const std::vector<std::string>& base, const std::vector<std::string>& over);
+
+/// The other way: what words as said_words mean. Fails: Usage.
+Result<PackOptions> understand_words(const std::vector<std::string>& words);
+
+/// The limits of a conversion as words.
 struct LimitWords {
     double timeout_seconds = WorkerLimits{}.wall_seconds;
-    std::string memory = "8GiB", disk = "0";
+    std::string memory = "auto", disk = "16GiB";
 };
-std::vector<CLI::Option*> add_limit_options(CLI::App& app, LimitWords& words);
-/// Fails: Usage.
-Result<WorkerLimits> understand(const LimitWords& words);
+void add_limit_options(CLI::App& app, LimitWords& words);
+/// `jobs`: conversions at a time, which share the machine's memory. Fails: Usage.
+Result<WorkerLimits> understand(const LimitWords& words, int jobs);
 
 /// "8MiB", "4GB", "1048576" -> bytes.
 std::optional<double> parse_bytes(const std::string& text);

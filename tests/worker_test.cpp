@@ -1,3 +1,4 @@
+#include "preprocess/machine_memory.h"
 #include "preprocess/worker.h"
 
 #include <chrono>
@@ -6,6 +7,7 @@
 #include <cstdlib>
 #include <fcntl.h>
 #include <filesystem>
+#include <fstream>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
@@ -234,6 +236,21 @@ TEST(worker, dies_with_its_parent)
     char byte;
     EXPECT_EQ(read(ends[0], &byte, 1), 0); // end of file: the worker is gone as well
     close(ends[0]);
+}
+
+TEST(machine_memory, is_the_least_that_a_group_or_one_above_it_has_been_given)
+{
+    const auto root = std::filesystem::path(testing::TempDir()) / "control_groups";
+    std::filesystem::create_directories(root / "job" / "task");
+    EXPECT_EQ(group_memory(root, "/job/task"), UINT64_MAX);
+    std::ofstream(root / "job" / "memory.max") << "4096\n";
+    std::ofstream(root / "job" / "task" / "memory.max") << "max\n";
+    EXPECT_EQ(group_memory(root, "/job/task"), 4096u);
+    EXPECT_EQ(group_memory(root, "/job"), 4096u);
+    EXPECT_EQ(group_memory(root, "/"), UINT64_MAX);
+    EXPECT_EQ(group_memory(root / "job", "/"), 4096u); // as a container sees its own
+    EXPECT_GT(machine_memory(), 256ull << 20);
+    std::filesystem::remove_all(root);
 }
 
 } // namespace

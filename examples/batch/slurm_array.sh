@@ -15,13 +15,9 @@ fi
 out=$1
 shift
 
-"${TRIMRAY:-trimray}" batch "$@" -o "$out" --shard "$SLURM_ARRAY_TASK_ID/$shards" --resume \
+"${TRIMRAY:-trimray}" batch "$@" -o "$out" --shard "$SLURM_ARRAY_TASK_ID/$shards" --resume --failures-ok \
     --jobs "$SLURM_CPUS_PER_TASK" --memory-limit "${SLURM_MEM_PER_CPU}MiB" # a processor, and its memory, a file
 status=$?
-if [ $status = 6 ]; then # failures that are in the ledger: no reason to try again
-    echo "the ledger names files that failed or lost faces" >&2
-    exit 0
-fi
 if [ $status -gt 128 ] && [ "${SLURM_RESTART_COUNT:-0}" -lt 3 ]; then # stopped by a signal, the node lives
     scontrol requeue "$SLURM_JOB_ID" && sleep 60 # until Slurm ends this run
 fi

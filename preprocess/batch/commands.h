@@ -14,6 +14,8 @@ inline constexpr const char* kBatchProgram = "trimray batch";
 
 /// `trimray batch INPUTS -o OUTDIR`; `words` is the whole command line, for the ledger.
 void register_run(CLI::App& app, const std::vector<std::string>& words, int& exit_code);
+/// `retry`: what failed or was begun again, from the ledger alone; `words` as above.
+void register_retry(CLI::App& app, const std::vector<std::string>& words, int& exit_code);
 /// `plan`: lists of files of equal size, one a shard.
 void register_plan(CLI::App& app, int& exit_code);
 /// `status`: what became of the files, and who is at work.

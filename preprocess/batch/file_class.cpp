@@ -1,5 +1,9 @@
 #include "preprocess/batch/file_class.h"
 
+#include <algorithm>
+#include <fmt/format.h>
+#include <iterator>
+
 namespace trimray {
 
 const char* class_name(FileClass kind)
@@ -83,6 +87,25 @@ bool has_pack(FileClass kind)
 bool worth_a_retry(FileClass kind)
 {
     return kind == FileClass::Crash || kind == FileClass::Timeout;
+}
+
+Result<std::set<FileClass>> parse_classes(const std::string& option, const std::vector<std::string>& names)
+{
+    std::set<FileClass> classes;
+    for (const std::string& name : names) {
+        const std::optional<FileClass> kind = class_named(name);
+        if (kind)
+            classes.insert(*kind);
+        else if (name == "failed")
+            std::copy_if(kFileClasses.begin(), kFileClasses.end(), std::inserter(classes, classes.end()),
+                         [](FileClass each) { return !has_pack(each); });
+        else
+            return Error{ErrorCode::Usage, option,
+                         fmt::format("'{}' is no class; there are failed (all that have no pack), incomplete, invalid, "
+                                     "unsupported, timeout, memory, crash, io",
+                                     name)};
+    }
+    return classes;
 }
 
 } // namespace trimray

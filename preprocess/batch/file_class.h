@@ -5,8 +5,10 @@
 
 #include <array>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace trimray {
 
@@ -28,6 +30,9 @@ inline constexpr std::array kFileClasses{FileClass::Done,        FileClass::Inco
 /// "done", "incomplete", "invalid", ...
 const char* class_name(FileClass kind);
 std::optional<FileClass> class_named(std::string_view name);
+
+/// Classes as words of an option; "failed" is all that have no pack. Fails: Usage.
+Result<std::set<FileClass>> parse_classes(const std::string& option, const std::vector<std::string>& names);
 
 /// The class of a conversion that failed.
 FileClass class_of(const Error& error);

@@ -48,6 +48,11 @@ bool matches(const std::vector<std::string>& patterns, const std::string& name)
            });
 }
 
+int64_t modified_ns(const struct stat& status)
+{
+    return static_cast<int64_t>(status.st_mtim.tv_sec) * 1'000'000'000 + status.st_mtim.tv_nsec;
+}
+
 class Lister {
 public:
     explicit Lister(const InputOptions& options) : options_(options) {}
@@ -117,8 +122,7 @@ public:
 private:
     void add(const std::string& path, uint64_t bytes, const struct stat& status)
     {
-        BatchFile file{path, name_of(path), bytes,
-                       static_cast<int64_t>(status.st_mtim.tv_sec) * 1'000'000'000 + status.st_mtim.tv_nsec};
+        BatchFile file{path, name_of(path), bytes, modified_ns(status)};
         if (matches(options_.include, file.name))
             list_.files.push_back(std::move(file));
     }
@@ -220,6 +224,19 @@ Result<InputList> list_inputs(const InputOptions& options)
             return added.error();
     }
     return lister.finish();
+}
+
+BatchFile as_it_is_now(BatchFile file)
+{
+    struct stat status {};
+    if (stat(file.path.c_str(), &status) == 0) {
+        file.bytes = static_cast<uint64_t>(status.st_size);
+        file.modified_ns = modified_ns(status);
+    } else if (const size_t member = file.path.find("!/");
+               member != std::string::npos && stat(file.path.substr(0, member).c_str(), &status) == 0) {
+        file.modified_ns = modified_ns(status);
+    }
+    return file;
 }
 
 } // namespace trimray

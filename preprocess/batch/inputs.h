@@ -44,4 +44,8 @@ struct InputList {
 /// name).
 Result<InputList> list_inputs(const InputOptions& options);
 
+/// A file of an earlier batch as it is now: with its size (a member of an archive keeps the one it had) and its time.
+/// It may be gone: then those stay as they were.
+BatchFile as_it_is_now(BatchFile file);
+
 } // namespace trimray

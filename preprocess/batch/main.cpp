@@ -19,6 +19,7 @@ constexpr const char* kFooter =
     "  trimray batch parts/ more.zip 'abc/*.step' -o packs --jobs 8 --timeout 120 --memory-limit 4GiB\n"
     "  trimray batch parts/ -o packs --resume              # after an interruption: only what is left\n"
     "  trimray batch parts/ -o packs --retry crash,timeout # and those again\n"
+    "  trimray batch retry packs --timeout 3600            # all that failed, whatever the inputs were\n"
     "  find / -name '*.stp' | trimray batch - -o packs\n"
     "  trimray batch parts/ -o /shared/packs --shard 3/16  # on the fourth of sixteen machines\n"
     "\nExit codes: 0 every file done, 1 usage, 2 the folder cannot be read or written, 6 some files failed or lost\n"
@@ -35,6 +36,7 @@ int main(int argc, char** argv)
     app.footer(kFooter);
     int exit_code = kExitOk;
     register_run(app, {argv, argv + argc}, exit_code);
+    register_retry(app, {argv, argv + argc}, exit_code);
     register_plan(app, exit_code);
     register_status(app, exit_code);
     register_report(app, exit_code);

@@ -161,9 +161,18 @@ Json report_json(const BatchSummary& summary)
         failures.push_back(row_of(summary, *failed[i]));
     for (size_t i = 0; i < std::min(made.size(), kMostSlow); ++i)
         slowest.push_back(row_of(summary, *made[i]));
-    return {{"files", summary.files.size() + summary.begun.size()},
+    Json begun = Json::array();
+    size_t never_ended = 0;
+    for (const FileSummary& start : summary.begun) {
+        begun.push_back(start.file);
+        never_ended += std::binary_search(summary.files.begin(), summary.files.end(), start,
+                                          [](const auto& a, const auto& b) { return a.file < b.file; })
+                           ? 0
+                           : 1;
+    }
+    return {{"files", summary.files.size() + never_ended},
             {"classes", classes},
-            {"begun", summary.begun},
+            {"begun", begun},
             {"groups", groups_json(summary)},
             {"conversion_seconds", distribution(seconds)},
             {"peak_memory_bytes", distribution(peak_bytes)},

@@ -23,7 +23,7 @@ std::vector<std::string> words(const Json& object, const char* key)
     return list;
 }
 
-RunSummary run_of(const Json& event)
+RunSummary run_from(const Json& event)
 {
     RunSummary run;
     run.run = json_value<std::string>(event, "run", "");
@@ -39,7 +39,7 @@ RunSummary run_of(const Json& event)
     return run;
 }
 
-FileSummary file_of(const Json& event)
+FileSummary file_from(const Json& event)
 {
     FileSummary file;
     file.file = json_value<std::string>(event, "file", "");
@@ -49,7 +49,8 @@ FileSummary file_of(const Json& event)
     file.kind = class_named(json_value<std::string>(event, "class", "")).value_or(FileClass::Crash);
     file.attempt = json_value(event, "attempt", 1);
     file.peak_memory_bytes = json_value<uint64_t>(event, "peak_memory_bytes", 0);
-    file.source_bytes = json_value<uint64_t>(event, "source_bytes", json_value<uint64_t>(event, "bytes", 0));
+    file.listed_bytes = json_value<uint64_t>(event, "bytes", 0);
+    file.source_bytes = json_value<uint64_t>(event, "source_bytes", file.listed_bytes);
     file.pack_bytes = json_value<uint64_t>(event, "pack_bytes", 0);
     file.faces = json_value<uint64_t>(event, "faces", 0);
     file.dropped_faces = json_value<uint64_t>(event, "dropped_faces", 0);
@@ -131,20 +132,21 @@ Result<BatchSummary> summarize(const std::filesystem::path& output)
 {
     BatchSummary summary;
     std::unordered_map<std::string, FileSummary> ended;
-    std::unordered_map<std::string, std::string> started; // when
+    std::unordered_map<std::string, FileSummary> started;
     const Result<size_t> torn = read_ledger(output / "ledger", [&](const Json& event) {
         const std::string kind = json_value<std::string>(event, "event", "");
         if (kind == "run") {
-            summary.runs.push_back(run_of(event));
+            summary.runs.push_back(run_from(event));
         } else if (kind == "stop") {
             for (RunSummary& run : summary.runs)
                 if (run.run == json_value<std::string>(event, "run", "-"))
                     run.stop = event;
         } else if (kind == "start") {
-            std::string& time = started[json_value<std::string>(event, "file", "")];
-            time = std::max(time, json_value<std::string>(event, "time", ""));
+            FileSummary start = file_from(event);
+            if (FileSummary& last = started[start.file]; start.time >= last.time)
+                last = std::move(start);
         } else if (kind == "end" && json_value(event, "final", false)) {
-            FileSummary file = file_of(event);
+            FileSummary file = file_from(event);
             const auto it = ended.find(file.file);
             if (it == ended.end()) {
                 std::string name = file.file;
@@ -161,28 +163,34 @@ Result<BatchSummary> summarize(const std::filesystem::path& output)
     if (!torn)
         return torn.error();
     summary.torn_lines = *torn;
-    for (const auto& [name, time] : started) {
+    for (auto& [name, start] : started) {
         const auto it = ended.find(name);
-        if (it == ended.end() || it->second.time < time)
-            summary.begun.push_back(name);
+        if (it == ended.end() || it->second.time < start.time)
+            summary.begun.push_back(std::move(start));
     }
-    std::sort(summary.begun.begin(), summary.begun.end());
     for (auto& [name, file] : ended)
         summary.files.push_back(std::move(file));
-    std::sort(summary.files.begin(), summary.files.end(),
-              [](const FileSummary& a, const FileSummary& b) { return a.file < b.file; });
+    for (std::vector<FileSummary>* const list : {&summary.begun, &summary.files})
+        std::sort(list->begin(), list->end(),
+                  [](const FileSummary& a, const FileSummary& b) { return a.file < b.file; });
     std::sort(summary.runs.begin(), summary.runs.end(),
               [](const RunSummary& a, const RunSummary& b) { return a.time < b.time; });
     summary.groups = groups_of(summary.files);
     return summary;
 }
 
-std::string repeat_command(const BatchSummary& summary, const FileSummary& file)
+const RunSummary* run_of(const BatchSummary& summary, const FileSummary& file)
 {
     const auto run =
         std::find_if(summary.runs.begin(), summary.runs.end(), [&](const RunSummary& r) { return r.run == file.run; });
+    return run == summary.runs.end() ? nullptr : &*run;
+}
+
+std::string repeat_command(const BatchSummary& summary, const FileSummary& file)
+{
+    const RunSummary* const run = run_of(summary, file);
     std::string command = fmt::format("trimray pack {} -o repeated.tray", shell_word(file.path));
-    if (run == summary.runs.end())
+    if (run == nullptr)
         return command;
     for (const std::string& word : run->pack_words)
         command += ' ' + shell_word(word);

@@ -9,13 +9,14 @@
 
 namespace trimray {
 
-/// The end of one file, the latest that made or failed to make its pack.
+/// The end of one file, the latest that made or failed to make its pack; or its start, where it has not ended.
 struct FileSummary {
     std::string file, path, run, time;
     FileClass kind = FileClass::Done;
     int attempt = 1;
     double wall_seconds = 0, cpu_seconds = 0;
     uint64_t peak_memory_bytes = 0, source_bytes = 0, pack_bytes = 0;
+    uint64_t listed_bytes = 0; // as the inputs were listed: compressed files and members as they lie there
     uint64_t faces = 0, dropped_faces = 0;
     bool found = false; // its pack was there, so times tell nothing of the conversion
     std::string key, detail, phase, signal, frame;
@@ -41,7 +42,7 @@ struct FailureGroup {
 
 struct BatchSummary {
     std::vector<FileSummary> files;   // that have ended, by name
-    std::vector<std::string> begun;   // and have not ended
+    std::vector<FileSummary> begun;   // and have not ended since, by name; with what is known at the start
     std::vector<RunSummary> runs;     // by time
     std::vector<FailureGroup> groups; // the largest first
     size_t torn_lines = 0;
@@ -49,6 +50,9 @@ struct BatchSummary {
 
 /// Reads OUTDIR/ledger. Fails: FileNotReadable.
 Result<BatchSummary> summarize(const std::filesystem::path& output);
+
+/// The run that a file's end or start is of; nullptr: the ledger has lost it.
+const RunSummary* run_of(const BatchSummary& summary, const FileSummary& file);
 
 /// The command that repeats what became of a file, for a shell.
 std::string repeat_command(const BatchSummary& summary, const FileSummary& file);

@@ -9,6 +9,7 @@
 #include <optional>
 #include <poll.h>
 #include <sys/resource.h>
+#include <unistd.h>
 #include <utility>
 
 namespace trimray {
@@ -39,6 +40,11 @@ double own_cpu_seconds()
     getrusage(RUSAGE_SELF, &own);
     return static_cast<double>(own.ru_utime.tv_sec + own.ru_stime.tv_sec) +
            1e-6 * static_cast<double>(own.ru_utime.tv_usec + own.ru_stime.tv_usec);
+}
+
+int64_t own_memory()
+{
+    return static_cast<int64_t>(resident_bytes(getpid()));
 }
 
 class Supervisor {
@@ -79,6 +85,7 @@ public:
             ended += count;
         result_.left = files_.size() - ended;
         result_.supervisor_cpu_seconds = own_cpu_seconds() - start_cpu_seconds_;
+        result_.supervisor_memory_growth = own_memory() - start_memory_;
         return result_;
     }
 
@@ -265,6 +272,7 @@ private:
     std::vector<Running> running_;
     BatchResult result_;
     double start_cpu_seconds_ = own_cpu_seconds();
+    int64_t start_memory_ = own_memory();
     std::optional<Error> failed_;
     Clock::time_point next_busy_look_{}, next_orphan_look_{}, next_watcher_call_{};
 };

@@ -57,7 +57,9 @@ struct BatchResult {
     uint64_t bytes = 0;                 // of the files that ended
     size_t left = 0;                    // not begun, or not ended, when it was stopped
     bool stopped = false;
-    double supervisor_cpu_seconds = 0; // of this process in `run_batch`, without its workers
+    // of this process in `run_batch`, without its workers
+    double supervisor_cpu_seconds = 0;
+    int64_t supervisor_memory_growth = 0; // bytes
 };
 
 /// Works through `files` in their order. Every file ends in exactly one class, in the ledger, unless the batch is

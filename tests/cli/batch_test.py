@@ -97,6 +97,7 @@ class Batch(CliTest):
         report = json.loads(done.stdout)
         self.assertEqual(sum(report["classes"].values()), len(mutants))
         self.assertEqual(report["left"], 0)
+        self.assertLess(report["supervisor_memory_growth_bytes"], 4 << 20)
         final = [end["file"] for end in events(out, "end") if end["final"]]
         self.assertEqual(len(final), len(set(final)))
         self.assertEqual(len(final), len(mutants))
@@ -164,6 +165,47 @@ class Batch(CliTest):
         self.assertEqual(len(events(out, "start")), ended)
         report = self.json_of("batch", models, "-o", out, "--resume", "--json")
         self.assertEqual((report["skipped"], report["classes"]["done"]), (ended, len(SMALL) - ended))
+
+    def test_retry_needs_no_inputs_and_keeps_each_files_options(self):
+        models, out = self.folder("in", ["unit_sphere.stp", "revolved_sphere.step"]), self.folder("out")
+        (models / "broken.step").write_text("no model", encoding="ascii")
+        with zipfile.ZipFile(models / "parts.zip", "w") as archive:
+            archive.writestr("other.step", "no model either")
+        program = [str(case.OPTIONS.bin / "trimray"), "batch"]
+        options = ["--no-previews", "--trim-memory", "50%", "--json"]
+        first = subprocess.run([*program, ".", "-o", str(out), *options, "--failures-ok"], cwd=models, timeout=60,
+                               capture_output=True, text=True, check=True)
+        self.assertEqual(json.loads(first.stdout)["classes"]["invalid"], 2)
+        resumed = subprocess.run([*program, ".", "-o", str(out), *options, "--resume"], cwd=models, timeout=60,
+                                 capture_output=True, text=True, check=False)
+        self.assertEqual(resumed.returncode, 6, resumed.stderr)
+
+        none = self.json_of("batch", "retry", out, "--class", "crash,memory", "--json")
+        self.assertEqual((none["files"], none["left"]), (0, 0))
+        shutil.copy2(MODELS / "nozzle.stp", models / "broken.step")
+        retried = run("batch", "retry", out, "--trim-memory", "25%", "--compact", "--json")
+        self.assertEqual(retried.returncode, 6, "the archive's member is broken still")
+        report = json.loads(retried.stdout)
+        self.assertEqual((report["files"], report["classes"]["done"], report["classes"]["invalid"]), (2, 1, 1))
+        self.assertEqual(events(out, "run")[-1]["pack_words"], ["--no-previews", "--trim-memory", "25%", "--compact"])
+        self.ok("validate", out / "packs" / "broken.step.tray")
+        with zipfile.ZipFile(models / "parts.zip", "w") as archive:
+            archive.write(MODELS / "sg1-c5-214.stp", "other.step")
+        self.assertEqual(self.json_of("batch", "retry", out, "--json")["classes"]["done"], 1)
+        self.assertEqual(self.json_of("batch", "retry", out, "--json")["files"], 0)
+        told = self.json_of("batch", "report", out, "--json")
+        self.assertEqual((told["files"], told["classes"]["done"], told["begun"]), (4, 4, []))
+
+    def test_retry_takes_up_what_was_begun(self):
+        models, out = self.folder("in", ["abc_00000050.step"]), self.folder("out")
+        with start(models, "-o", out, "-q") as batch:
+            while not list((out / "ledger").glob("*.jsonl")) or not events(out, "start"):
+                time.sleep(0.01)
+            batch.send_signal(signal.SIGKILL)
+        self.assertEqual(len(events(out, "end")), 0)
+        report = self.json_of("batch", "retry", out, "--no-previews", "--json")
+        self.assertEqual((report["files"], report["classes"]["done"]), (1, 1))
+        self.assertEqual(self.json_of("batch", "status", out, "--json")["begun"], [])
 
     def test_a_plan_shares_the_work_out(self):
         models, plan, out = self.folder("in", SMALL), self.folder("plan"), self.folder("out")
