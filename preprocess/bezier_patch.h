@@ -3,7 +3,7 @@
 
 #include "format/pack_layout.h"
 #include "format/result.h"
-#include "preprocess/cad_model.h"
+#include "preprocess/import/cad_model.h"
 
 #include <array>
 #include <span>

@@ -5,9 +5,9 @@
 #include "format/derive.h"
 #include "format/pack_image.h"
 #include "format/result.h"
-#include "preprocess/cad_model.h"
 #include "preprocess/face_ids.h"
-#include "preprocess/trim_loop.h"
+#include "preprocess/import/cad_model.h"
+#include "preprocess/trims/trim_loop.h"
 
 #include <string>
 

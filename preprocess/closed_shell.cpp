@@ -2,7 +2,7 @@
 
 #include "format/trim_piece.h"
 #include "preprocess/bezier_patch.h"
-#include "preprocess/trim_grow.h"
+#include "preprocess/trims/trim_grow.h"
 #include "preprocess/vec3d.h"
 
 #include <algorithm>

@@ -2,8 +2,8 @@
 // them shows its back, so what grown borders show of it can be left out (FaceRecord, kFaceRims).
 #pragma once
 
-#include "preprocess/cad_model.h"
-#include "preprocess/trim_loop.h"
+#include "preprocess/import/cad_model.h"
+#include "preprocess/trims/trim_loop.h"
 
 #include <cstdint>
 #include <vector>

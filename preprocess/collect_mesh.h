@@ -3,7 +3,7 @@
 
 #include "format/mesh_file.h"
 #include "preprocess/build_pack.h"
-#include "preprocess/cad_model.h"
+#include "preprocess/import/cad_model.h"
 
 #include <vector>
 

@@ -3,11 +3,11 @@
 #include "format/mesh_file.h"
 #include "format/pack_writer.h"
 #include "preprocess/build_pack.h"
-#include "preprocess/cad_import.h"
 #include "preprocess/collect_mesh.h"
 #include "preprocess/dump_trims.h"
+#include "preprocess/import/cad_import.h"
 #include "preprocess/preview.h"
-#include "preprocess/trim_report.h"
+#include "preprocess/trims/trim_report.h"
 
 #include <algorithm>
 #include <chrono>

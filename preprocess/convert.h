@@ -3,7 +3,7 @@
 
 #include "format/result.h"
 #include "preprocess/pack_options.h"
-#include "preprocess/source_file.h"
+#include "preprocess/source/source_file.h"
 
 #include <nlohmann/json.hpp>
 #include <string>

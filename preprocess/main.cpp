@@ -5,8 +5,8 @@
 #include "format/result.h"
 #include "preprocess/convert.h"
 #include "preprocess/pack_options.h"
-#include "preprocess/source_file.h"
-#include "preprocess/worker.h"
+#include "preprocess/source/source_file.h"
+#include "preprocess/worker/worker.h"
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>

@@ -1,7 +1,7 @@
 #include "preprocess/pack_options.h"
 
 #include "format/pack_file.h"
-#include "preprocess/machine_memory.h"
+#include "preprocess/worker/machine_memory.h"
 
 #include <CLI/CLI.hpp>
 #include <algorithm>

@@ -3,8 +3,8 @@
 
 #include "format/result.h"
 #include "preprocess/build_pack.h"
-#include "preprocess/cad_import.h"
-#include "preprocess/worker.h"
+#include "preprocess/import/cad_import.h"
+#include "preprocess/worker/worker.h"
 
 #include <optional>
 #include <string>

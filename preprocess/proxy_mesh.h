@@ -3,8 +3,8 @@
 
 #include "format/pack_image.h"
 #include "format/proxy.h"
-#include "preprocess/cad_model.h"
 #include "preprocess/face_ids.h"
+#include "preprocess/import/cad_model.h"
 
 namespace trimray {
 

@@ -2,7 +2,7 @@
 // Source: Piegl & Tiller, The NURBS Book (A2.1, A2.3, A5.1); Borden et al. 2011 for the operator form.
 #pragma once
 
-#include "preprocess/cad_model.h"
+#include "preprocess/import/cad_model.h"
 
 #include <span>
 #include <vector>

@@ -1,7 +1,7 @@
 // Arithmetic of points and vectors of a parameter plane.
 #pragma once
 
-#include "preprocess/cad_model.h"
+#include "preprocess/import/cad_model.h"
 
 #include <cmath>
 

@@ -1,7 +1,7 @@
 // The few vector operations the converter needs on Vec3d.
 #pragma once
 
-#include "preprocess/cad_model.h"
+#include "preprocess/import/cad_model.h"
 
 #include <cmath>
 

@@ -6,7 +6,7 @@
 #include "preprocess/batch/resume.h"
 #include "preprocess/batch/store.h"
 #include "preprocess/batch/supervisor.h"
-#include "preprocess/process_tree.h"
+#include "preprocess/worker/process_tree.h"
 
 #include "format/pack_reader.h"
 #include "format/pack_writer.h"

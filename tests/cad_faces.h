@@ -1,7 +1,7 @@
 // Faces made by hand for tests of the converter: planes and cylinders with loops of lines and circles in uv_file.
 #pragma once
 
-#include "preprocess/cad_model.h"
+#include "preprocess/import/cad_model.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,6 +1,6 @@
 #include "preprocess/bezier_patch.h"
-#include "preprocess/cad_import.h"
-#include "preprocess/trim_curve.h"
+#include "preprocess/import/cad_import.h"
+#include "preprocess/trims/trim_curve.h"
 #include "preprocess/vec3d.h"
 #include "tests/occt_models.h"
 

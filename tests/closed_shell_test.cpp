@@ -1,6 +1,6 @@
 // Which faces bound closed shells, on solids whole, open, and turned inside out, as they come out in a pack.
 #include "preprocess/build_pack.h"
-#include "preprocess/cad_import.h"
+#include "preprocess/import/cad_import.h"
 #include "tests/occt_solids.h"
 
 #include <fmt/format.h>

@@ -1,7 +1,7 @@
 // Meshes of CAD files: on the surfaces and with their normals, and with the faces, placements and colours of the pack.
 #include "preprocess/build_pack.h"
-#include "preprocess/cad_import.h"
 #include "preprocess/collect_mesh.h"
+#include "preprocess/import/cad_import.h"
 
 #include <gtest/gtest.h>
 

@@ -1,7 +1,7 @@
 // Edge classes on shapes whose edges one can count, as imported and as they come out in a pack.
 #include "preprocess/build_pack.h"
-#include "preprocess/cad_import.h"
-#include "preprocess/edge_class.h"
+#include "preprocess/import/cad_import.h"
+#include "preprocess/trims/edge_class.h"
 #include "tests/occt_models.h"
 
 #include <gtest/gtest.h>

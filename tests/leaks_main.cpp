@@ -3,7 +3,7 @@
 #include "format/pack_reader.h"
 #include "format/pack_writer.h"
 #include "preprocess/build_pack.h"
-#include "preprocess/cad_import.h"
+#include "preprocess/import/cad_import.h"
 #include "runtime/tracer.h"
 #include "tests/hard/leaks.h"
 

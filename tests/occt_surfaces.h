@@ -1,7 +1,7 @@
 // Our surfaces as the CAD kernel's and back, for tests that compare the two.
 #pragma once
 
-#include "preprocess/cad_model.h"
+#include "preprocess/import/cad_model.h"
 
 #include <Geom_BSplineCurve.hxx>
 #include <Geom_BSplineSurface.hxx>

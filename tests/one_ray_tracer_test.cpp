@@ -1,6 +1,6 @@
 // The one-ray tracer, the peer that stands for the paper's shape of tracer: its pictures are the CPU tracer's own.
 #include "preprocess/build_pack.h"
-#include "preprocess/cad_import.h"
+#include "preprocess/import/cad_import.h"
 #include "runtime/derived_scene.h"
 #include "runtime/measure/one_ray_tracer.h"
 #include "tests/compare_frames.h"

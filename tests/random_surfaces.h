@@ -2,7 +2,7 @@
 // frames.
 #pragma once
 
-#include "preprocess/cad_model.h"
+#include "preprocess/import/cad_model.h"
 
 #include <algorithm>
 #include <cmath>

@@ -4,7 +4,7 @@
 #include "format/trim_reference.h"
 #include "format/trim_texture.h"
 #include "preprocess/build_pack.h"
-#include "preprocess/cad_import.h"
+#include "preprocess/import/cad_import.h"
 
 #include <gtest/gtest.h>
 #include <tbb/parallel_for.h>

@@ -1,10 +1,10 @@
 // A model's bytes out of files, compression and archives, sound and damaged ones, and the hashes of them.
-#include "preprocess/source_file.h"
+#include "preprocess/source/source_file.h"
 
-#include "preprocess/cad_names.h"
-#include "preprocess/content_hash.h"
-#include "preprocess/step_references.h"
-#include "preprocess/zip_archive.h"
+#include "preprocess/source/cad_names.h"
+#include "preprocess/source/content_hash.h"
+#include "preprocess/source/step_references.h"
+#include "preprocess/source/zip_archive.h"
 
 #include <archive.h>
 #include <archive_entry.h>

@@ -4,7 +4,7 @@
 #include "format/pack_reader.h"
 #include "format/pack_writer.h"
 #include "preprocess/build_pack.h"
-#include "preprocess/cad_import.h"
+#include "preprocess/import/cad_import.h"
 #include "runtime/camera.h"
 #include "tests/against_reference.h"
 #include "tests/compare_frames.h"

@@ -3,7 +3,7 @@
 
 #include "format/trim_piece.h"
 #include "preprocess/bezier_patch.h"
-#include "preprocess/trim_loop.h"
+#include "preprocess/trims/trim_loop.h"
 
 #include <algorithm>
 #include <cmath>

@@ -5,7 +5,7 @@
 #include "format/trim_query.h"
 #include "preprocess/bezier_patch.h"
 #include "preprocess/build_pack.h"
-#include "preprocess/cad_import_kernel.h"
+#include "preprocess/import/cad_import_kernel.h"
 #include "tests/trim_areas.h"
 #include "tests/trim_shapes.h"
 
@@ -31,7 +31,7 @@ struct Row {
 
 int check(const std::string& path, double worst_allowed)
 {
-    const Result<kernel::CadFormat> format = kernel::detect_format(path);
+    const Result<kernel::CadFormat> format = kernel::detect_format(path, "");
     if (!format.ok()) {
         fmt::print("{}: {}\n", path, format.error().detail);
         return 1;

@@ -1,7 +1,7 @@
 // Real faces: what the trims leave of each surface has the area that the CAD kernel computes by its own means.
 #include "tests/trim_areas.h"
 
-#include "preprocess/cad_import_kernel.h"
+#include "preprocess/import/cad_import_kernel.h"
 
 #include <BRepGProp.hxx>
 #include <GProp_GProps.hxx>

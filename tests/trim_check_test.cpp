@@ -1,6 +1,6 @@
 // What is doubtful about loops: found where it is, and only there.
-#include "preprocess/trim_check.h"
-#include "preprocess/trim_loop.h"
+#include "preprocess/trims/trim_check.h"
+#include "preprocess/trims/trim_loop.h"
 #include "tests/cad_faces.h"
 
 #include <gtest/gtest.h>

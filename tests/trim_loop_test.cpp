@@ -1,5 +1,5 @@
 // Pcurves to loops of monotone pieces: the same region within the tolerance, few pieces, shared ends, seams.
-#include "preprocess/trim_loop.h"
+#include "preprocess/trims/trim_loop.h"
 
 #include "tests/cad_faces.h"
 #include "tests/trim_shapes.h"

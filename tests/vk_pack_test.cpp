@@ -1,6 +1,6 @@
 // Real CAD files through the whole chain (file, model, pack, Vulkan) against the CPU tracer.
 #include "preprocess/build_pack.h"
-#include "preprocess/cad_import.h"
+#include "preprocess/import/cad_import.h"
 #include "runtime/tracer.h"
 #include "runtime/vk_device.h"
 #include "tests/compare_frames.h"

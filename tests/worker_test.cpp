@@ -1,5 +1,5 @@
-#include "preprocess/machine_memory.h"
-#include "preprocess/worker.h"
+#include "preprocess/worker/machine_memory.h"
+#include "preprocess/worker/worker.h"
 
 #include <chrono>
 #include <csignal>

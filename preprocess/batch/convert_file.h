@@ -4,8 +4,8 @@
 #include "format/result.h"
 #include "preprocess/batch/inputs.h"
 #include "preprocess/batch/store.h"
-#include "preprocess/source_file.h"
-#include "preprocess/worker.h"
+#include "preprocess/source/source_file.h"
+#include "preprocess/worker/worker.h"
 
 #include <filesystem>
 #include <functional>

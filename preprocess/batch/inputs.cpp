@@ -1,8 +1,8 @@
 #include "preprocess/batch/inputs.h"
 
-#include "preprocess/cad_names.h"
-#include "preprocess/source_file.h"
-#include "preprocess/worker.h"
+#include "preprocess/source/cad_names.h"
+#include "preprocess/source/source_file.h"
+#include "preprocess/worker/worker.h"
 
 #include <algorithm>
 #include <cerrno>

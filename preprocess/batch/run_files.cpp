@@ -4,8 +4,8 @@
 #include "format/pack_file.h"
 #include "preprocess/batch/progress_view.h"
 #include "preprocess/batch/supervisor.h"
-#include "preprocess/cad_import.h"
 #include "preprocess/convert.h"
+#include "preprocess/import/cad_import.h"
 
 #include <CLI/CLI.hpp>
 #include <algorithm>

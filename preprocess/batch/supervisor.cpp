@@ -1,6 +1,6 @@
 #include "preprocess/batch/supervisor.h"
 
-#include "preprocess/process_tree.h"
+#include "preprocess/worker/process_tree.h"
 
 #include <algorithm>
 #include <chrono>

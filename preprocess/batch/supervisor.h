@@ -7,7 +7,7 @@
 #include "preprocess/batch/inputs.h"
 #include "preprocess/batch/ledger.h"
 #include "preprocess/batch/store.h"
-#include "preprocess/worker.h"
+#include "preprocess/worker/worker.h"
 
 #include <csignal>
 #include <map>

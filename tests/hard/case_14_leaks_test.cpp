@@ -1,7 +1,7 @@
 // Gaps between neighbouring faces: none shows the inside of a closed solid.
 #include "preprocess/bezier_patch.h"
 #include "preprocess/build_pack.h"
-#include "preprocess/cad_import.h"
+#include "preprocess/import/cad_import.h"
 #include "preprocess/vec3d.h"
 #include "tests/hard/leaks.h"
 #include "tests/keep_vulkan_loaded.h"

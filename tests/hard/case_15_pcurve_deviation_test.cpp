@@ -1,9 +1,9 @@
 // Hard case 15: a pcurve that runs beside its edge's curve in space. The deviation is measured for each edge, reported,
 // and the pcurve rebuilt where it is the pcurve that is wrong.
 #include "preprocess/bezier_patch.h"
-#include "preprocess/cad_import.h"
-#include "preprocess/trim_curve.h"
-#include "preprocess/trim_report.h"
+#include "preprocess/import/cad_import.h"
+#include "preprocess/trims/trim_curve.h"
+#include "preprocess/trims/trim_report.h"
 #include "tests/occt_models.h"
 
 #include <gtest/gtest.h>

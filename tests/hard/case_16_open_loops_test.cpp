@@ -1,7 +1,7 @@
 // Hard case 16: loops that do not close. Ends that nearly meet are moved together, wider gaps are closed by a straight
 // line and reported; either way the area is off by no more than the gap calls for.
-#include "preprocess/trim_chain.h"
-#include "preprocess/trim_loop.h"
+#include "preprocess/trims/trim_chain.h"
+#include "preprocess/trims/trim_loop.h"
 #include "tests/cad_faces.h"
 #include "tests/hard/trim_modes.h"
 

@@ -1,6 +1,6 @@
 // Hard case 18: loops that cross or touch themselves or each other. One rule, even-odd, decides what is inside; where
 // they meet is reported.
-#include "preprocess/trim_loop.h"
+#include "preprocess/trims/trim_loop.h"
 #include "tests/cad_faces.h"
 #include "tests/hard/trim_modes.h"
 

@@ -1,7 +1,7 @@
 // Seams: where a closed surface is cut open must not show.
 #include "format/trim_reference.h"
 #include "preprocess/build_pack.h"
-#include "preprocess/cad_import.h"
+#include "preprocess/import/cad_import.h"
 #include "tests/hard/trim_modes.h"
 #include "tests/occt_solids.h"
 #include "tests/traced_file.h"

@@ -1,7 +1,7 @@
 // Hard case 22: a surface in other parameters than the file's needs its pcurves in those too.
 #include "format/trim_piece.h"
 #include "preprocess/bezier_patch.h"
-#include "preprocess/trim_curve.h"
+#include "preprocess/trims/trim_curve.h"
 #include "preprocess/vec3d.h"
 #include "tests/occt_solids.h"
 #include "tests/traced_file.h"
