@@ -15,7 +15,11 @@ const shown = (value, digits, none = "–") =>
         : value.toLocaleString("en", {maximumFractionDigits : digits, minimumFractionDigits : digits > 3 ? 0 : digits});
 const headed = (...titles) => el("thead", {}, el("tr", {}, ...titles.map(t => el("th", {scope : "col"}, t))));
 const rowOf = (...cells) => el("tr", {}, ...cells.map(c => el("td", {}, c)));
-// A table whose headings sort it. columns: [key, title, text of a row's cell, class]; the first column is words
+const missing = value => value === null || value === undefined || Number.isNaN(value);
+// -1, 0 or 1; not a difference, which is no number between infinities
+const order = (a, b) => typeof a === "string" ? a.localeCompare(b) : Number(a > b) - Number(a < b);
+// A table whose headings sort it. columns: [key, title, text of a row's cell, class]; the first column is words.
+// Rows without a value stay below the others, whichever way.
 const sortable = (caption, columns, rows, attributes = {}) => {
     const body = el("tbody"), head = el("tr");
     const fill = sorted => body.replaceChildren(...sorted.map(
@@ -25,8 +29,7 @@ const sortable = (caption, columns, rows, attributes = {}) => {
         for (const other of head.children)
             other.removeAttribute("aria-sort");
         cell.setAttribute("aria-sort", up ? "ascending" : "descending");
-        fill([...rows ].sort((a, b) => (up ? 1 : -1) *
-                                       (typeof a[key] === "string" ? a[key].localeCompare(b[key]) : a[key] - b[key])));
+        fill([...rows ].sort((a, b) => missing(a[key]) - missing(b[key]) || (up ? 1 : -1) * order(a[key], b[key])));
     };
     for (const [key, title, , kind] of columns) {
         const cell = el("th", {scope : "col", "data-key" : key, ...(kind ? {class : kind} : {})}),

@@ -1,8 +1,6 @@
 """What the scripts that take every file of a corpus of CAD files through programs, a row a file, share."""
 
 import argparse
-import csv
-import fnmatch
 import os
 import pathlib
 import resource
@@ -11,19 +9,6 @@ import subprocess
 import sys
 import tempfile
 import time
-
-from bench_tables import MODEL_ENDINGS, plain_name
-
-SLACK_SECONDS = 20  # the converter's own limit comes first, and gives the clearer message
-
-
-def cad_files(corpus):
-    """Paths relative to the corpus, small files first."""
-    found = []
-    for path in corpus.rglob("*"):
-        if path.is_file() and pathlib.Path(plain_name(path)).suffix.lower() in MODEL_ENDINGS:
-            found.append(path)
-    return [p.relative_to(corpus) for p in sorted(found, key=lambda p: (p.stat().st_size, str(p)))]
 
 
 def run(command, timeout, memory_bytes=0):
@@ -74,17 +59,3 @@ def built(options, **programs):
         if not path.exists():
             sys.exit(f"{path}: not built")
     return paths
-
-
-def chosen_files(options):
-    """As cad_files, those that --only names."""
-    return [name for name in cad_files(options.corpus)
-            if not options.only or any(fnmatch.fnmatch(str(name), glob) for glob in options.only)]
-
-
-def done_rows(options):
-    """The rows that the table has, by file."""
-    if not options.output.exists():
-        return {}
-    with open(options.output, newline="", encoding="utf-8") as table:
-        return {row["file"]: row for row in csv.DictReader(table, delimiter="\t")}
