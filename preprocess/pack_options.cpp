@@ -38,6 +38,12 @@ Result<uint64_t> parse_limit(const std::string& option, const std::string& text)
     return static_cast<uint64_t>(*bytes);
 }
 
+/// Down to whole MiB.
+uint64_t whole_mib(uint64_t bytes)
+{
+    return bytes >> 20 << 20;
+}
+
 } // namespace
 
 std::optional<double> parse_bytes(const std::string& text)
@@ -162,9 +168,9 @@ void add_limit_options(CLI::App& app, LimitWords& words)
 Result<WorkerLimits> understand(const LimitWords& words, int jobs)
 {
     constexpr uint64_t kLeast = 2ull << 30, kMost = 8ull << 30;
-    const Result<uint64_t> memory = words.memory == "auto"
-                                        ? std::clamp(machine_memory() / static_cast<uint64_t>(jobs), kLeast, kMost)
-                                        : parse_limit("--memory-limit", words.memory);
+    const Result<uint64_t> memory =
+        words.memory == "auto" ? std::clamp(whole_mib(machine_memory() / static_cast<uint64_t>(jobs)), kLeast, kMost)
+                               : parse_limit("--memory-limit", words.memory);
     if (!memory)
         return memory.error();
     const Result<uint64_t> disk = parse_limit("--disk-limit", words.disk);

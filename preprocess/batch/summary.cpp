@@ -1,6 +1,7 @@
 #include "preprocess/batch/summary.h"
 
 #include "format/shell_word.h"
+#include "preprocess/worker/worker.h"
 
 #include <algorithm>
 #include <cctype>
@@ -76,6 +77,14 @@ FileSummary file_from(const Json& event)
     if (const auto dropped = event.find("dropped"); dropped != event.end() && dropped->is_array() && !dropped->empty())
         file.dropped_reason = json_value<std::string>(dropped->front(), "reason", "");
     return file;
+}
+
+/// "8GiB": as the options for limits take it.
+std::string size_word(uint64_t bytes)
+{
+    if (bytes > 0 && bytes % (1ull << 30) == 0)
+        return fmt::format("{}GiB", bytes >> 30);
+    return bytes > 0 && bytes % (1ull << 20) == 0 ? fmt::format("{}MiB", bytes >> 20) : std::to_string(bytes);
 }
 
 /// Without what differs from file to file: numbers, and what stands in quotes.
@@ -194,10 +203,9 @@ std::string repeat_command(const BatchSummary& summary, const FileSummary& file)
         return command;
     for (const std::string& word : run->pack_words)
         command += ' ' + shell_word(word);
-    if (run->timeout_seconds > 0)
+    if (run->timeout_seconds != WorkerLimits{}.wall_seconds)
         command += fmt::format(" --timeout {}", run->timeout_seconds);
-    if (run->memory_limit_bytes > 0)
-        command += fmt::format(" --memory-limit {}", run->memory_limit_bytes);
+    command += fmt::format(" --memory-limit {}", size_word(run->memory_limit_bytes));
     const bool absolute = file.path.starts_with('/');
     return absolute || run->folder.empty() ? command : fmt::format("cd {} && {}", shell_word(run->folder), command);
 }
