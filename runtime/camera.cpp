@@ -1,5 +1,7 @@
 #include "runtime/camera.h"
 
+#include "runtime/camera_frame.h"
+
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -8,70 +10,6 @@
 namespace trimray {
 namespace {
 
-using Vec3 = std::array<double, 3>;
-
-Vec3 operator-(const Vec3& a, const Vec3& b)
-{
-    return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
-}
-Vec3 operator+(const Vec3& a, const Vec3& b)
-{
-    return {a[0] + b[0], a[1] + b[1], a[2] + b[2]};
-}
-Vec3 operator*(const Vec3& a, double s)
-{
-    return {a[0] * s, a[1] * s, a[2] * s};
-}
-double dot(const Vec3& a, const Vec3& b)
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-Vec3 cross(const Vec3& a, const Vec3& b)
-{
-    return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
-
-/// Unit vector along a, or `fallback` where a has no direction.
-Vec3 normalised(const Vec3& a, const Vec3& fallback)
-{
-    const double largest = std::max({std::abs(a[0]), std::abs(a[1]), std::abs(a[2])});
-    if (!(largest > 0) || !std::isfinite(largest))
-        return fallback;
-    const Vec3 scaled = a * (1 / largest);
-    return scaled * (1 / std::sqrt(dot(scaled, scaled)));
-}
-
-struct Axes {
-    Vec3 forward, right, up;
-};
-
-/// An eye at its target looks down; an up along the view gives way to the axis that is farthest from the view.
-Axes camera_axes(const Camera& camera)
-{
-    constexpr double kLeastSine = 1e-6; // of the angle between view and up
-    Axes axes;
-    axes.forward = normalised(camera.target - camera.eye, {0, 0, -1});
-    Vec3 up = normalised(camera.up, {0, 0, 1});
-    const Vec3 across = cross(axes.forward, up);
-    if (dot(across, across) < kLeastSine * kLeastSine) {
-        size_t least = 0;
-        for (size_t i = 1; i < 3; ++i)
-            if (std::abs(axes.forward[i]) < std::abs(axes.forward[least]))
-                least = i;
-        up = {0, 0, 0};
-        up[least] = 1;
-    }
-    axes.right = normalised(cross(axes.forward, up), {1, 0, 0});
-    axes.up = cross(axes.right, axes.forward);
-    return axes;
-}
-
-double half_height(double fov_deg)
-{
-    constexpr double kDegree = 3.14159265358979323846 / 180;
-    return std::tan(0.5 * std::clamp(fov_deg, 1e-9, 179.0) * kDegree);
-}
-
 // How far back, in picture heights, the pinhole of parallel rays lies. Over a model as deep as the picture is high they
 // shift against each other by 1 / 3e7 of it at most, a ten-thousandth of a pixel of 3,000; and doubles place an eye so
 // far away to 4e-9 of the height, pairs of floats to 1e-7.
@@ -79,7 +17,7 @@ constexpr double kParallelFrom = 3e7;
 
 struct StandardView {
     const char* name;
-    Vec3 looks_along, up;
+    std::array<double, 3> looks_along, up;
 };
 constexpr StandardView kViews[] = {
     {"iso", {-1, 1, -1}, {0, 0, 1}},  {"front", {0, 1, 0}, {0, 0, 1}},  {"back", {0, -1, 0}, {0, 0, 1}},
@@ -107,9 +45,37 @@ void turn(const StandardView& view, Camera& camera)
 
 } // namespace
 
+CameraAxes camera_axes(const Camera& camera)
+{
+    using namespace camera_math;
+    constexpr double kLeastSine = 1e-6; // of the angle between view and up
+    CameraAxes axes;
+    axes.forward = normalised(camera.target - camera.eye, {0, 0, -1});
+    Vec3 up = normalised(camera.up, {0, 0, 1});
+    const Vec3 across = cross(axes.forward, up);
+    if (dot(across, across) < kLeastSine * kLeastSine) {
+        size_t least = 0;
+        for (size_t i = 1; i < 3; ++i)
+            if (std::abs(axes.forward[i]) < std::abs(axes.forward[least]))
+                least = i;
+        up = {0, 0, 0};
+        up[least] = 1;
+    }
+    axes.right = normalised(cross(axes.forward, up), {1, 0, 0});
+    axes.up = cross(axes.right, axes.forward);
+    return axes;
+}
+
+double half_height(double fov_deg)
+{
+    constexpr double kDegree = 3.14159265358979323846 / 180;
+    return std::tan(0.5 * std::clamp(fov_deg, 1e-9, 179.0) * kDegree);
+}
+
 CameraRays camera_rays(const Camera& camera, uint32_t width, uint32_t height)
 {
-    const Axes axes = camera_axes(camera);
+    using namespace camera_math;
+    const CameraAxes axes = camera_axes(camera);
     const bool parallel = camera.orthographic_mm > 0;
     const double half_y = parallel ? 0.5 / kParallelFrom : half_height(camera.fov_deg);
     const double half_x = half_y * width / height;
@@ -124,7 +90,8 @@ CameraRays camera_rays(const Camera& camera, uint32_t width, uint32_t height)
 
 ParallelRays parallel_rays(const Camera& camera, uint32_t width, uint32_t height)
 {
-    const Axes axes = camera_axes(camera);
+    using namespace camera_math;
+    const CameraAxes axes = camera_axes(camera);
     const double half_y = 0.5 * camera.orthographic_mm, half_x = half_y * width / height;
     return {camera.eye - axes.right * half_x + axes.up * half_y, axes.right * (2 * half_x / width),
             axes.up * (-2 * half_y / height), axes.forward};
@@ -141,15 +108,14 @@ const std::vector<std::string>& standard_view_names()
     return names;
 }
 
-bool standard_view(const std::string& name, const Reach& reach, double aspect, double fov_deg, Camera& camera)
+namespace {
+
+/// Fails never: what has no bounds leaves the camera as it is.
+void frame_perspective(Camera& camera, const Reach& reach, double aspect)
 {
-    const StandardView* const view = find_view(name);
-    if (view == nullptr)
-        return false;
-    camera.fov_deg = fov_deg;
-    turn(*view, camera);
-    const Axes axes = camera_axes(camera);
-    const double tan_y = half_height(fov_deg) / kBorder, tan_x = tan_y * aspect;
+    using namespace camera_math;
+    const CameraAxes axes = camera_axes(camera);
+    const double tan_y = half_height(camera.fov_deg) / kBorder, tan_x = tan_y * aspect;
     // A point p is within the picture's right side when (p - eye) . right <= tan_x (p - eye) . forward, that is
     // p . s <= eye . s with s = right / tan_x - forward: the reach along s. The other three sides likewise.
     const double right = reach(axes.right * (1 / tan_x) - axes.forward);
@@ -158,7 +124,7 @@ bool standard_view(const std::string& name, const Reach& reach, double aspect, d
     const double down = reach(axes.up * (-1 / tan_y) - axes.forward);
     const double nearest = -reach(axes.forward * -1), farthest = reach(axes.forward);
     if (!std::isfinite(right + left + up + down + nearest + farthest))
-        return true; // nothing to frame
+        return; // nothing to frame
     // the eye may go no farther along the view than either pair of sides allows, and lies midway between them
     double along = -0.5 * std::max(right + left, up + down);
     if (!(along < nearest))
@@ -166,6 +132,45 @@ bool standard_view(const std::string& name, const Reach& reach, double aspect, d
     camera.eye =
         axes.right * (0.5 * (right - left) * tan_x) + axes.up * (0.5 * (up - down) * tan_y) + axes.forward * along;
     camera.target = camera.eye + axes.forward * (0.5 * (nearest + farthest) - along);
+}
+
+/// height_mm: of what is seen; 0: so much that it is seen whole.
+void frame_parallel(Camera& camera, const Reach& reach, double aspect, double height_mm)
+{
+    using namespace camera_math;
+    camera.orthographic_mm = height_mm > 0 ? height_mm : 1;
+    const CameraAxes axes = camera_axes(camera);
+    const double right = reach(axes.right), left = -reach(axes.right * -1), up = reach(axes.up),
+                 down = -reach(axes.up * -1), nearest = -reach(axes.forward * -1), farthest = reach(axes.forward);
+    if (!std::isfinite(right + left + up + down + nearest + farthest))
+        return; // nothing to frame
+    const double fits = std::max(up - down, (right - left) / aspect) * kBorder;
+    if (!(height_mm > 0) && fits > 0) // a point has no height: a millimetre is seen
+        camera.orthographic_mm = fits;
+    // before the model, by no more than rounding needs: depths are then about the model's own size
+    const double along = nearest - std::max(0.01 * (farthest - nearest), 1e-3 * camera.orthographic_mm);
+    camera.eye = axes.right * (0.5 * (right + left)) + axes.up * (0.5 * (up + down)) + axes.forward * along;
+    camera.target = camera.eye + axes.forward * (0.5 * (nearest + farthest) - along);
+}
+
+} // namespace
+
+void frame_whole(Camera& camera, const Reach& reach, double aspect)
+{
+    if (camera.orthographic_mm > 0)
+        frame_parallel(camera, reach, aspect, 0);
+    else
+        frame_perspective(camera, reach, aspect);
+}
+
+bool standard_view(const std::string& name, const Reach& reach, double aspect, double fov_deg, Camera& camera)
+{
+    const StandardView* const view = find_view(name);
+    if (view == nullptr)
+        return false;
+    camera.fov_deg = fov_deg;
+    turn(*view, camera);
+    frame_perspective(camera, reach, aspect);
     return true;
 }
 
@@ -175,20 +180,8 @@ bool standard_orthographic_view(const std::string& name, const Reach& reach, dou
     const StandardView* const view = find_view(name);
     if (view == nullptr)
         return false;
-    camera.orthographic_mm = height_mm > 0 ? height_mm : 1;
     turn(*view, camera);
-    const Axes axes = camera_axes(camera);
-    const double right = reach(axes.right), left = -reach(axes.right * -1), up = reach(axes.up),
-                 down = -reach(axes.up * -1), nearest = -reach(axes.forward * -1), farthest = reach(axes.forward);
-    if (!std::isfinite(right + left + up + down + nearest + farthest))
-        return true; // nothing to frame
-    const double fits = std::max(up - down, (right - left) / aspect) * kBorder;
-    if (!(height_mm > 0) && fits > 0) // a point has no height: a millimetre is seen
-        camera.orthographic_mm = fits;
-    // before the model, by no more than rounding needs: depths are then about the model's own size
-    const double along = nearest - std::max(0.01 * (farthest - nearest), 1e-3 * camera.orthographic_mm);
-    camera.eye = axes.right * (0.5 * (right + left)) + axes.up * (0.5 * (up + down)) + axes.forward * along;
-    camera.target = camera.eye + axes.forward * (0.5 * (nearest + farthest) - along);
+    frame_parallel(camera, reach, aspect, height_mm);
     return true;
 }
 
