@@ -63,9 +63,9 @@ class CliTest(unittest.TestCase):
             self.assertIn(words, lines[0])
         return done
 
-    def json_of(self, *arguments):
+    def json_of(self, *arguments, **keywords):
         """The one object on stdout, and what was said on stderr."""
-        done = self.ok(*arguments)
+        done = self.ok(*arguments, **keywords)
         self.assertEqual(len(done.stdout.splitlines()), 1, "one object, one line")
         return json.loads(done.stdout)
 
