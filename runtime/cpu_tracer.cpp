@@ -84,6 +84,8 @@ public:
             take_queries(stats.trim_queries);
             return work;
         });
+        if (options.is_cancelled())
+            return given_up();
         stats.buffer_bytes = stats.kd_bytes + stats.border_bytes + (has_effects(options) ? edge_map_.size_bytes() : 0) +
                              (asks_free_rays ? to_part_.size() * sizeof(WorldToPart) : 0) +
                              (options.shade && has_materials(options.look) ? materials->size_bytes() : 0) +
@@ -151,6 +153,8 @@ private:
                        rows = (options.height + kBlockSide - 1) / kBlockSide;
         tbb::enumerable_thread_specific<WorkCounts> counts;
         const auto trace_one = [&](uint32_t i) {
+            if (options.is_cancelled())
+                return;
             const uint32_t x = i % columns * kBlockSide, y = i / columns * kBlockSide;
             const Block block{x, y, std::min(x + kBlockSide, options.width), std::min(y + kBlockSide, options.height)};
             trace_block_(job, block, scratch_.local(), frame, counts.local());

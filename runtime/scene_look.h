@@ -91,6 +91,15 @@ struct Environment {
     std::string name;       // of the file, for messages
 };
 
+/// Which placements are there, and where. A name is a part's or a placement's; "#N" is the part of that number in the
+/// pack, "@N" the placement of that number.
+struct Arrangement {
+    std::vector<std::string> only; // empty: all
+    std::vector<std::string> hide; // of those
+    double explode = 0; // each moves away from the model's middle by so many times its own distance from there, >= 0
+    bool any() const { return !only.empty() || !hide.empty() || explode != 0; }
+};
+
 struct SceneLook {
     // What rays that meet nothing see: an environment, else a colour, else nothing (alpha 0; black in mirrors)
     std::optional<std::array<float, 3>> background;
@@ -106,6 +115,7 @@ struct SceneLook {
     std::optional<float> xray; // opacity of every surface that no rule gives one: all of them show through
     SurfaceMapLook map;
     SectionLook section;
+    Arrangement arrangement;
 };
 
 } // namespace trimray

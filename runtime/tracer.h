@@ -76,6 +76,10 @@ struct RenderOptions {
     // Told the share of a frame that is done, by one thread at a time. By the reference alone: the others are done at
     // once
     std::function<void(double share)> progress;
+    // Asked by any thread, many times a frame; once it says true, render gives up and fails: Interrupted. Not asked by
+    // the reference
+    std::function<bool()> cancelled;
+    bool is_cancelled() const { return cancelled && cancelled(); }
 
     // What is drawn over the surfaces: rgba alone changes, and only where it is asked for. Needs shade.
     EdgeLines edges = EdgeLines::None;
@@ -92,6 +96,12 @@ struct RenderOptions {
 
     SceneLook look; // lights, materials, shadows, sections, maps
 };
+
+/// What render fails with where RenderOptions::cancelled says so.
+inline Error given_up()
+{
+    return {ErrorCode::Interrupted, "", "the picture was no longer wanted"};
+}
 
 /// Per-pixel results, row 0 at the top. A miss has depth +inf, face -1, zeros elsewhere.
 struct Frame {

@@ -44,6 +44,8 @@ const uint32_t kBlendSpirv[] =
 
 // Bounds the memory of a band and the time of a dispatch, which some drivers end after a second or two
 constexpr size_t kBandBytes = size_t{32} << 20;
+// Between bands a picture may be given up: a software driver takes seconds for a band of the size above
+constexpr uint32_t kSoftwareRowsToGiveUp = 32;
 
 constexpr uint32_t kLookDone = kLookLights | kLookShadows | kLookSoftShadows | kLookOcclusion | kLookMap |
                                kLookSection | kLookCaps | kLookMaterials | kLookTransparency | kLookMirrors |
@@ -158,10 +160,13 @@ Result<ComputePipeline*> VulkanTracer::pipeline(std::span<const uint32_t> spirv,
 }
 
 // Traces all bands; `frame` may be null, then nothing is read back. Returns milliseconds.
-Result<double> VulkanTracer::trace_frame(FrameView view, uint32_t rows_per_band, Frame* frame)
+Result<double> VulkanTracer::trace_frame(const RenderOptions& options, FrameView view, uint32_t rows_per_band,
+                                         Frame* frame)
 {
     double ms = 0;
     for (view.first_row = 0; view.first_row < view.height; view.first_row += rows_per_band) {
+        if (options.is_cancelled())
+            return given_up();
         view.row_count = std::min(rows_per_band, view.height - view.first_row);
         const Result<double> band_ms = trace_band(view, frame != nullptr);
         if (!band_ms)
@@ -283,8 +288,10 @@ Result<Frame> VulkanTracer::render(const RenderOptions& options, RenderStats& st
         return Error{ErrorCode::Usage, "--size",
                      fmt::format("{}x{}: at least 1x1, and at most {} wide on this device", options.width,
                                  options.height, band_bytes / sizeof(FramePixel))};
-    const auto rows_per_band = static_cast<uint32_t>(std::min<size_t>(
+    auto rows_per_band = static_cast<uint32_t>(std::min<size_t>(
         {options.height, band_bytes / row_bytes, size_t{limits.maxComputeWorkGroupCount[1]} * kGroupSide}));
+    if (options.cancelled && device_->is_software())
+        rows_per_band = std::min(rows_per_band, kSoftwareRowsToGiveUp);
 
     if (const Status ready = upload_trims(*trim); !ready)
         return ready.error();
@@ -357,7 +364,7 @@ Result<Frame> VulkanTracer::render(const RenderOptions& options, RenderStats& st
         return none.error();
     use_ = *counting;
     if (count_apart) {
-        if (const Result<double> ms = trace_frame(view, rows_per_band, nullptr); !ms)
+        if (const Result<double> ms = trace_frame(options, view, rows_per_band, nullptr); !ms)
             return ms.error();
         if (const Status none = forget_kept(plan); !none)
             return none.error();
@@ -387,7 +394,7 @@ Result<Frame> VulkanTracer::render(const RenderOptions& options, RenderStats& st
         const bool read = i + 1 == frames || device_->is_software() || has_effects(options);
         choose_start(i);
         dispatches_ = 0;
-        const Result<double> ms = trace_frame(view, rows_per_band, read ? &frame : nullptr);
+        const Result<double> ms = trace_frame(options, view, rows_per_band, read ? &frame : nullptr);
         if (!ms)
             return ms.error();
         // what the host draws counts as much as what the device traces

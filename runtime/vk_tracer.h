@@ -101,7 +101,7 @@ private:
     std::array<const VulkanBuffer*, kFrameBindings> bound_buffers() const;
     void swap_layers();
     Result<double> trace_band(const FrameView& view, bool read_back);
-    Result<double> trace_frame(FrameView view, uint32_t rows_per_band, Frame* frame);
+    Result<double> trace_frame(const RenderOptions& options, FrameView view, uint32_t rows_per_band, Frame* frame);
     void take_pixels(const FrameView& view, Frame& frame) const;
     void take_edges(const FrameView& view);
     void describe(RenderStats& stats) const;
