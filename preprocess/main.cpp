@@ -26,7 +26,7 @@ using Json = nlohmann::ordered_json;
 struct Options {
     ConvertJob job;
     WorkerLimits limits;
-    bool json = false;
+    bool json = false, progress = false;
     bool mesh = false; // else a pack
 };
 
@@ -71,6 +71,10 @@ Result<std::optional<Options>> parse_options(int argc, char** argv)
     mesh->excludes(app.add_option("--dump-trims", options.job.dump_folder,
                                   "Write each trimmed face's loops and distances as a picture"));
     app.add_flag("--json", options.json, "Report as one JSON object");
+    app.add_flag(
+        "--progress", options.progress,
+        "Say each phase and its share done on stderr, lines 'progress PHASE SHARE' (-1: unknown), for programs "
+        "that wait; a terminal is told anyway");
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {
@@ -171,9 +175,11 @@ void print_mesh_table(const Json& report)
         row("missing", fmt::format("face {} of the pack: the kernel made no triangles", face.get<size_t>()));
 }
 
-/// Shows the phase on a terminal, nothing elsewhere.
-WorkerProgress terminal_progress()
+/// Shows the phase on a terminal, in lines to a program that asks for them, else nothing.
+WorkerProgress shown_progress(bool in_lines)
 {
+    if (in_lines)
+        return [](const char* phase, double share) { fmt::print(stderr, "progress {} {:.2f}\n", phase, share); };
     if (!isatty(STDERR_FILENO))
         return {};
     return [](const char* phase, double share) {
@@ -201,11 +207,11 @@ int run(int argc, char** argv)
         return report_error(
             {ErrorCode::Usage, options.job.output, "is the model itself; name another file for the pack"}, kProgram);
 
-    const WorkerProgress progress = terminal_progress();
+    const WorkerProgress progress = shown_progress(options.progress);
     const Result<std::string> answer = run_in_worker(
         options.job.model, [&](const WorkerReport& report) { return work(options, *source, report); }, options.limits,
         progress);
-    if (progress)
+    if (progress && !options.progress)
         fmt::print(stderr, "\r\033[K");
     if (!answer) {
         sweep_stale_temporaries(options.job.output); // of a worker that was ended while it wrote

@@ -19,6 +19,7 @@ const std::vector<ExternalCommand>& external_commands()
     static const std::vector<ExternalCommand> commands = {
         {"pack", "trimray-pack", "Convert a STEP, IGES or BREP model into a scene pack"},
         {"batch", "trimray-batch", "Convert many models, each in a process of its own, with a ledger"},
+        {"view", "trimray-view", "Look at packs and models in a window"},
         {"bench accuracy", "trimray-measure", "What each digit costs in time and memory, as a report"},
         {"bench speed", "trimray-measure", "Speed beside baselines, and exact counts, against a stored run"},
     };

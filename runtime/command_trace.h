@@ -2,6 +2,7 @@
 #pragma once
 
 #include "format/result.h"
+#include "runtime/picture_size.h"
 #include "runtime/scene_request.h"
 #include "runtime/tracer.h"
 
@@ -35,10 +36,6 @@ const char* closest_name(ClosestPolicy policy);
 /// one, else the CPU; `note` says which and why. Fails: NoDevice, DeviceFailed, UnsupportedPackFeature.
 Result<std::unique_ptr<Tracer>> make_tracer(const std::shared_ptr<const Scene>& scene, const std::string& device,
                                             std::string& note);
-
-struct PictureSize {
-    uint32_t width = 0, height = 0;
-};
 
 /// "WxH" in pixels, each of samples x samples rays. Fails: Usage.
 Result<PictureSize> parse_size(const std::string& text, uint32_t samples);

@@ -3,15 +3,12 @@
 #pragma once
 
 #include "runtime/camera.h"
+#include "runtime/picture_size.h"
 
 #include <array>
 #include <cstdint>
 
 namespace trimray {
-
-struct PictureSize {
-    uint32_t width = 1, height = 1;
-};
 
 /// What turning keeps.
 enum class Turning {

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "format/result.h"
-#include "runtime/measure/converter.h"
+#include "runtime/command_converter.h"
 #include "runtime/measure/measure.h"
 
 #include <cstdint>

@@ -1,17 +1,20 @@
-#include "runtime/measure/converter.h"
+#include "runtime/command_converter.h"
 
+#include "format/pack_writer.h"
 #include "runtime/commands.h"
 
 #include <fmt/format.h>
 
 #include <array>
 #include <cerrno>
+#include <csignal>
 #include <cstdlib>
 #include <cstring>
 #include <fcntl.h>
 #include <filesystem>
-#include <fstream>
+#include <poll.h>
 #include <spawn.h>
+#include <sstream>
 #include <sys/wait.h>
 #include <system_error>
 #include <unistd.h>
@@ -42,52 +45,94 @@ Error cannot_run(const std::string& program, int code)
     return Error{ErrorCode::Internal, program, fmt::format("cannot be run: {}", std::strerror(code))};
 }
 
-/// What a program prints on stdout, and its exit code. Its stderr goes to the file `log`.
-Result<std::pair<std::string, int>> output_of(const std::string& program, std::vector<std::string> arguments,
-                                              const std::string& log)
+/// What a program said, and its exit code.
+struct Ran {
+    std::string output, last_words; // stdout; the last line on stderr
+    int exit_code = kExitInternal;
+};
+
+/// Takes "progress PHASE SHARE"; false: the line is something else.
+bool take_progress(const std::string& line, const ConverterWatch& watch)
+{
+    std::istringstream words(line);
+    std::string word, phase, share;
+    words >> word >> phase >> share;
+    if (word != "progress" || share.empty())
+        return false;
+    if (watch.progress)
+        watch.progress(phase, std::strtod(share.c_str(), nullptr));
+    return true;
+}
+
+/// Reads what is there. False: the other end is closed.
+bool read_some(int descriptor, std::string& text)
+{
+    std::array<char, 65536> buffer;
+    const ssize_t count = ::read(descriptor, buffer.data(), buffer.size());
+    if (count > 0)
+        text.append(buffer.data(), static_cast<size_t>(count));
+    return count > 0 || (count < 0 && errno == EINTR);
+}
+
+/// Runs a program in a process group of its own. Fails: Internal (it cannot be run), Interrupted.
+Result<Ran> run_watched(const std::string& program, std::vector<std::string> arguments, const ConverterWatch& watch)
 {
     arguments.insert(arguments.begin(), program);
     std::vector<char*> argv;
     for (std::string& argument : arguments)
         argv.push_back(argument.data());
     argv.push_back(nullptr);
-    Pipe pipe;
-    if (::pipe2(pipe.ends.data(), O_CLOEXEC) != 0)
+    Pipe output, errors;
+    if (::pipe2(output.ends.data(), O_CLOEXEC) != 0 || ::pipe2(errors.ends.data(), O_CLOEXEC) != 0)
         return cannot_run(program, errno);
     posix_spawn_file_actions_t actions;
     posix_spawn_file_actions_init(&actions);
-    posix_spawn_file_actions_adddup2(&actions, pipe.ends[1], STDOUT_FILENO);
-    posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, log.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
+    posix_spawn_file_actions_adddup2(&actions, output.ends[1], STDOUT_FILENO);
+    posix_spawn_file_actions_adddup2(&actions, errors.ends[1], STDERR_FILENO);
+    posix_spawnattr_t attributes;
+    posix_spawnattr_init(&attributes);
+    posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
     pid_t child = -1;
-    const int failed = posix_spawn(&child, program.c_str(), &actions, nullptr, argv.data(), environ);
+    const int failed = posix_spawn(&child, program.c_str(), &actions, &attributes, argv.data(), environ);
+    posix_spawnattr_destroy(&attributes);
     posix_spawn_file_actions_destroy(&actions);
     if (failed != 0)
         return cannot_run(program, failed);
-    pipe.close_end(1);
-    std::string text;
-    std::array<char, 65536> buffer;
-    for (;;) {
-        const ssize_t count = ::read(pipe.ends[0], buffer.data(), buffer.size());
-        if (count > 0)
-            text.append(buffer.data(), static_cast<size_t>(count));
-        else if (count == 0 || errno != EINTR)
-            break;
+    output.close_end(1);
+    errors.close_end(1);
+
+    constexpr int kAskEveryMs = 100;
+    Ran ran;
+    std::string said;
+    bool cancelled = false;
+    std::array<pollfd, 2> ends{pollfd{output.ends[0], POLLIN, 0}, pollfd{errors.ends[0], POLLIN, 0}};
+    while (ends[0].fd >= 0 || ends[1].fd >= 0) {
+        ::poll(ends.data(), ends.size(), watch.cancelled ? kAskEveryMs : -1);
+        if (!cancelled && watch.cancelled && watch.cancelled()) {
+            cancelled = true;
+            ::kill(-child, SIGTERM); // its worker dies with it, and holds stderr open until then
+        }
+        if (ends[0].revents != 0 && !read_some(ends[0].fd, ran.output))
+            ends[0].fd = -1;
+        if (ends[1].revents != 0 && !read_some(ends[1].fd, said))
+            ends[1].fd = -1;
+        for (size_t end = said.find('\n'); end != std::string::npos; end = said.find('\n')) {
+            const std::string line = said.substr(0, end);
+            said.erase(0, end + 1);
+            if (!take_progress(line, watch) && !line.empty())
+                ran.last_words = line;
+        }
     }
     int status = 0;
     while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
     }
-    return std::pair{std::move(text), WIFEXITED(status) ? WEXITSTATUS(status) : int{kExitInternal}};
-}
-
-/// "no reason given": there is none.
-std::string last_line(const std::string& path)
-{
-    std::ifstream file(path);
-    std::string last = "no reason given";
-    for (std::string line; std::getline(file, line);)
-        if (!line.empty())
-            last = line;
-    return last;
+    if (cancelled)
+        return Error{ErrorCode::Interrupted, "", "the conversion was given up"};
+    if (!said.empty())
+        ran.last_words = said;
+    if (WIFEXITED(status))
+        ran.exit_code = WEXITSTATUS(status);
+    return ran;
 }
 
 ErrorCode code_of(int exit_code)
@@ -136,21 +181,25 @@ ScratchFolder::~ScratchFolder()
         fs::remove_all(path_, ignored);
 }
 
-Result<Json> run_converter(const std::string& model, const std::string& output, const std::vector<std::string>& options)
+Result<Json> run_converter(const std::string& model, const std::string& output, const std::vector<std::string>& options,
+                           const ConverterWatch& watch)
 {
     const Result<std::string> program = find_program("trimray-pack");
     if (!program.ok())
         return program.error();
     std::vector<std::string> arguments{model, "-o", output, "--json"};
+    if (watch.progress)
+        arguments.push_back("--progress");
     arguments.insert(arguments.end(), options.begin(), options.end());
-    const std::string log = output + ".log";
-    const auto ran = output_of(*program, arguments, log);
-    if (!ran.ok())
+    const Result<Ran> ran = run_watched(*program, arguments, watch);
+    if (!ran.ok()) {
+        sweep_stale_temporaries(output);
         return ran.error();
-    const auto& [text, exit_code] = *ran;
-    if (exit_code != kExitOk && exit_code != kExitPartial)
-        return Error{code_of(exit_code), model, "was not converted: " + last_line(log)};
-    Json report = Json::parse(text, nullptr, false);
+    }
+    if (ran->exit_code != kExitOk && ran->exit_code != kExitPartial)
+        return Error{code_of(ran->exit_code), model,
+                     "was not converted: " + (ran->last_words.empty() ? "no reason given" : ran->last_words)};
+    Json report = Json::parse(ran->output, nullptr, false);
     if (report.is_discarded())
         return Error{ErrorCode::Internal, *program, "its report is no JSON"};
     return report;

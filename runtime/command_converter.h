@@ -4,6 +4,7 @@
 #include "format/result.h"
 #include "runtime/command_json.h"
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -28,11 +29,17 @@ private:
     std::string path_; // empty: moved from
 };
 
+/// Watches a conversion; both are called by the thread that waits for it, and may be empty.
+struct ConverterWatch {
+    std::function<void(const std::string& phase, double share)> progress; // share in [0, 1], negative where unknown
+    std::function<bool()> cancelled; // asked some times a second; true ends the conversion, which leaves nothing behind
+};
+
 /// Runs `trimray-pack MODEL -o OUTPUT OPTIONS --json` and gives what it reports, also of a model that is not whole then
-/// (losses). What it says on stderr is kept in OUTPUT.log. Fails: UnsupportedFormat (there is no such program, or no
-/// such format); as its exit code says, with its last words.
-Result<Json> run_converter(const std::string& model, const std::string& output,
-                           const std::vector<std::string>& options);
+/// (losses). Fails: UnsupportedFormat (there is no such program, or no such format); Interrupted (cancelled); as its
+/// exit code says, with its last words.
+Result<Json> run_converter(const std::string& model, const std::string& output, const std::vector<std::string>& options,
+                           const ConverterWatch& watch = {});
 
 /// What a report of trimray-pack says is not there, or doubtful: faces dropped, faces without triangles, its warnings.
 std::vector<std::string> losses(const Json& report);

@@ -1,0 +1,39 @@
+// What is drawn around and over the picture: panels, status line, messages, the cube of views, the cheat sheet.
+#pragma once
+
+#include "runtime/view/gl_picture.h"
+#include "runtime/view/viewer.h"
+
+#include <cstdint>
+
+namespace trimray {
+
+class Interface {
+public:
+    explicit Interface(float scale) : scale_(scale) {}
+
+    /// Draws all of it into the frame at hand of a window of so many pixels, and tells the viewer where its picture is.
+    void draw(Viewer& viewer, int width, int height);
+    /// Whether the pointer, or the keys, are the interface's now: the viewer does not get them.
+    bool wants_pointer() const { return wants_pointer_; }
+    bool wants_keys() const { return wants_keys_; }
+
+private:
+    void draw_picture(Viewer& viewer);
+    void draw_selection(Viewer& viewer);
+    void draw_status(Viewer& viewer, int width, int height);
+    void draw_toasts(Viewer& viewer);
+    void draw_loading(Viewer& viewer);
+    void draw_cheat_sheet(Viewer& viewer, int width, int height);
+    void draw_view_cube(Viewer& viewer);
+    void draw_times(Viewer& viewer);
+    void draw_look(Viewer& viewer, int width, int height);
+    float em() const;
+
+    float scale_;
+    GlPicture picture_, selection_;
+    uint64_t uploaded_ = 0, outlined_ = 0;
+    bool wants_pointer_ = false, wants_keys_ = false;
+};
+
+} // namespace trimray

@@ -1,0 +1,579 @@
+#include "runtime/view/viewer.h"
+
+#include "format/pack_writer.h"
+#include "runtime/camera_frame.h"
+#include "runtime/command_trace.h"
+#include "runtime/image_io.h"
+#include "runtime/scene_write.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <utility>
+
+namespace trimray {
+namespace {
+namespace fs = std::filesystem;
+using namespace std::chrono_literals;
+
+constexpr auto kStillAfter = 150ms;       // without a move, a view rests
+constexpr auto kDoubleClick = 350ms;      // at most between two clicks
+constexpr double kClickPixels = 4;        // that the pointer may move in a click
+constexpr double kZoomStep = 1.0 / 1.2;   // of distances, a step of the wheel
+constexpr double kZoomDragPixels = 150.0; // of a drag that makes distances e times as long
+
+/// The next of `values` after `now`, or the first.
+template <class T, size_t N>
+T next_of(const std::array<T, N>& values, const T& now)
+{
+    const auto at = std::find(values.begin(), values.end(), now);
+    return at == values.end() || at + 1 == values.end() ? values.front() : *(at + 1);
+}
+
+const char* view_of(Action action)
+{
+    switch (action) {
+    case Action::ViewFront:
+        return "front";
+    case Action::ViewBack:
+        return "back";
+    case Action::ViewLeft:
+        return "left";
+    case Action::ViewRight:
+        return "right";
+    case Action::ViewTop:
+        return "top";
+    case Action::ViewBottom:
+        return "bottom";
+    default:
+        return "iso";
+    }
+}
+
+/// The camera with its target, about which it turns, in the depth of the middle of what it shows.
+Camera turning_about_middle(Camera camera, const Reach& reach)
+{
+    using namespace camera_math;
+    const Vec3 forward = camera_axes(camera).forward;
+    const double middle = 0.5 * (reach(forward) - reach(forward * -1)), way = middle - dot(camera.eye, forward);
+    if (way > 0)
+        camera.target = camera.eye + forward * way;
+    return camera;
+}
+
+} // namespace
+
+Viewer::Viewer(Start start)
+    : state_(std::move(start.state)), preset_(start.preset ? start.preset : &presets().front()),
+      turning_(preset_->turning), wake_(std::move(start.wake)), screenshot_folder_(std::move(start.screenshot_folder)),
+      first_camera_(std::move(start.camera)), loader_(std::move(start.make_tracer), wake_), pictures_(wake_)
+{
+    if (!start.files.empty())
+        open(std::move(start.files));
+}
+
+// ---- files ---------------------------------------------------------------------------------------------------------
+
+void Viewer::open(std::vector<std::string> files, size_t index)
+{
+    if (files.empty())
+        return;
+    files_ = std::move(files);
+    file_index_ = index;
+    keeps_view_ = false;
+    begin_load();
+}
+
+void Viewer::begin_load()
+{
+    failure_.reset();
+    loader_.start(files_[file_index_]);
+    if (on_title)
+        on_title(fs::path(files_[file_index_]).filename().string());
+}
+
+void Viewer::cancel_load()
+{
+    loader_.cancel();
+    if (!model_)
+        failure_ = Error{ErrorCode::Interrupted, files_.empty() ? "" : files_[file_index_], "opening was cancelled"};
+    else
+        tell("cancelled");
+}
+
+void Viewer::take_model()
+{
+    std::optional<Result<LoadedModel>> done = loader_.take();
+    if (!done)
+        return;
+    if (!done->ok()) {
+        const Error& error = done->error();
+        tell(fmt::format("{}: {}", error.where, error.detail), true);
+        if (!model_ || model_->file != files_[file_index_])
+            failure_ = error;
+        return;
+    }
+    const bool keeps_view = keeps_view_ && model_;
+    pictures_.finish(); // the old tracer is let go before its scene
+    shown_.reset();
+    hits_.reset();
+    selection_.reset();
+    ++shown_count_;
+    model_ = std::move(**done);
+    for (const std::string& note : model_->notes)
+        tell(note);
+    if (!keeps_view) {
+        SceneCamera asked = std::exchange(first_camera_, std::nullopt).value_or(SceneCamera{});
+        if (!asked.eye && state_.camera.orthographic_mm > 0)
+            asked.parallel = true;
+        const Result<Camera> camera = camera_of(asked, image(), size().width, size().height);
+        if (camera.ok())
+            state_.camera = asked.eye ? *camera : turning_about_middle(*camera, model_reach(image()));
+        else
+            tell(camera.error().detail, true);
+    }
+    dirty_ = true;
+}
+
+// ---- pictures ------------------------------------------------------------------------------------------------------
+
+void Viewer::set_picture_rect(const PictureRect& rect)
+{
+    const bool same_size = rect.width == rect_.width && rect.height == rect_.height;
+    rect_ = {rect.x, rect.y, std::max(rect.width, 1), std::max(rect.height, 1)};
+    if (!same_size)
+        changed(true); // a window's border being dragged is a move
+}
+
+void Viewer::changed(bool moving)
+{
+    dirty_ = true;
+    if (moving) {
+        moving_ = true;
+        still_at_ = Clock::now() + kStillAfter;
+    }
+}
+
+void Viewer::order(bool moving)
+{
+    const Result<RenderOptions> options = options_of(state_, size(), image());
+    if (!options.ok()) {
+        tell(options.error().detail, true);
+        return;
+    }
+    ordered_ = pictures_.order({model_->tracer, *options, state_.samples(), moving});
+}
+
+void Viewer::take_picture()
+{
+    if (std::optional<Error> error = pictures_.take_error())
+        tell(error->detail, true);
+    std::optional<ShownPicture> picture = pictures_.take();
+    if (!picture)
+        return;
+    ++shown_count_;
+    if (picture->samples == 1)
+        hits_ = *picture;
+    shown_ = std::move(picture);
+}
+
+void Viewer::update(Clock::time_point now)
+{
+    take_model();
+    if (!model_)
+        return;
+    take_picture();
+    if (moving_ && now >= still_at_ && buttons_ == 0) {
+        moving_ = false;
+        dirty_ = true;
+    }
+    if (std::exchange(dirty_, false))
+        order(moving_);
+    write_pending();
+    std::erase_if(toasts_, [now](const Toast& toast) { return toast.until <= now; });
+}
+
+double Viewer::patience(Clock::time_point now) const
+{
+    std::optional<Clock::time_point> next;
+    const auto sooner = [&next](Clock::time_point at) { next = next ? std::min(*next, at) : at; };
+    if (moving_ && buttons_ == 0)
+        sooner(still_at_);
+    for (const Toast& toast : toasts_)
+        sooner(toast.until);
+    if (loader_.busy())
+        sooner(now + 100ms); // its bar runs
+    return next ? std::max(0.001, std::chrono::duration<double>(*next - now).count()) : -1;
+}
+
+bool Viewer::at_rest() const
+{
+    if (loader_.busy() || moving_ || dirty_ || !pending_.empty())
+        return false;
+    return !model_ || (shown_ && shown_->complete && shown_->order == ordered_);
+}
+
+void Viewer::save_picture(const std::string& file, bool transparent)
+{
+    if (model_)
+        pending_.push_back({file, transparent});
+}
+
+void Viewer::write_pending()
+{
+    if (pending_.empty() || !shown_ || !shown_->complete || shown_->order != ordered_ || moving_ || dirty_)
+        return;
+    for (const PendingPicture& picture : std::exchange(pending_, {})) {
+        ViewState state = state_;
+        state.has_background = state.has_background && !picture.transparent;
+        const Result<std::vector<std::byte>> png =
+            encode_png(state.has_background ? shown_->colours : shown_->transparent());
+        const std::string text = scene_text(scene_of(state)) + "\n";
+        const std::string sidecar = fs::path(picture.file).replace_extension(".json").string();
+        Status written = png.ok() ? write_file_atomically(picture.file, *png) : Status(png.error());
+        if (written.ok()) {
+            const auto bytes = std::as_bytes(std::span(text));
+            written = write_file_atomically(sidecar, {bytes.begin(), bytes.end()});
+        }
+        if (!written.ok()) {
+            tell(fmt::format("{}: {}", written.error().where, written.error().detail), true);
+            continue;
+        }
+        tell(fmt::format("saved {}; the same again: trimray render {} --scene {} --size {}x{} -o FILE.png",
+                         picture.file, model_->pack, sidecar, shown_->full_width, shown_->full_height));
+    }
+}
+
+void Viewer::tell(std::string text, bool is_error)
+{
+    std::erase_if(toasts_, [&](const Toast& toast) { return toast.text == text; });
+    toasts_.push_back({std::move(text), is_error, Clock::now() + (is_error ? 12s : 6s)});
+}
+
+// ---- views ---------------------------------------------------------------------------------------------------------
+
+void Viewer::look_from(const std::string& view)
+{
+    if (!model_)
+        return;
+    const double aspect = double(rect_.width) / rect_.height;
+    Camera camera = state_.camera;
+    if (state_.camera.orthographic_mm > 0)
+        standard_orthographic_view(view, model_reach(image()), aspect, 0, camera);
+    else
+        standard_view(view, model_reach(image()), aspect, camera.fov_deg, camera);
+    look_along(turning_about_middle(camera, model_reach(image())));
+}
+
+void Viewer::look_along(const Camera& camera)
+{
+    state_.camera = camera;
+    changed();
+}
+
+void Viewer::frame(const Reach& reach)
+{
+    Camera camera = state_.camera;
+    frame_whole(camera, reach, double(rect_.width) / rect_.height);
+    look_along(turning_about_middle(camera, reach));
+}
+
+void Viewer::set_preset(const Preset& preset)
+{
+    preset_ = &preset;
+    turning_ = preset.turning;
+}
+
+// ---- what lies under the pointer -----------------------------------------------------------------------------------
+
+std::optional<PickedPoint> Viewer::pick(double x, double y) const
+{
+    const auto [px, py] = in_picture(x, y);
+    if (!hits_ || px < 0 || py < 0 || px >= rect_.width || py >= rect_.height)
+        return std::nullopt;
+    const Frame& frame = hits_->frame;
+    const auto column = std::min(uint32_t(px * frame.width / rect_.width), frame.width - 1),
+               row = std::min(uint32_t(py * frame.height / rect_.height), frame.height - 1);
+    const size_t at = size_t(row) * frame.width + column;
+    if (frame.instance[at] < 0 && frame.face[at] < 0)
+        return std::nullopt;
+    const CameraRays rays = camera_rays(hits_->traced.camera, frame.width, frame.height);
+    using namespace camera_math;
+    const Vec3 along = normalised(rays.corner + rays.step_x * (column + 0.5) + rays.step_y * (row + 0.5), {0, 0, -1});
+    PickedPoint picked;
+    picked.face = frame.face[at];
+    picked.instance = frame.instance[at];
+    picked.uv = {frame.uv[2 * at], frame.uv[2 * at + 1]};
+    picked.eye_mm = rays.eye;
+    double distance = frame.depth_mm[at];
+    if (rays.plane_mm > 0) // depth counts from the plane, along the middle of the view
+        distance += rays.plane_mm / dot(along, camera_axes(hits_->traced.camera).forward);
+    picked.point_mm = rays.eye + along * distance;
+    return picked;
+}
+
+std::optional<PickedPoint> Viewer::hovered() const
+{
+    return buttons_ == 0 ? pick(pointer_x_, pointer_y_) : std::nullopt;
+}
+
+std::array<double, 3> Viewer::point_under(double x, double y) const
+{
+    if (const std::optional<PickedPoint> picked = pick(x, y))
+        return picked->point_mm;
+    const auto [px, py] = in_picture(x, y);
+    return point_at_target(state_.camera, px, py, size());
+}
+
+void Viewer::select(std::optional<PickedPoint> picked)
+{
+    selection_ = std::move(picked);
+    ++shown_count_; // its overlay is another
+}
+
+void Viewer::click(double x, double y)
+{
+    const auto now = Clock::now();
+    const bool is_double = now - last_click_ < kDoubleClick;
+    last_click_ = is_double ? Clock::time_point{} : now;
+    if (is_double)
+        recenter(x, y);
+    else
+        select(pick(x, y));
+}
+
+// Turns go about the point from now on; it comes into the picture's middle.
+void Viewer::recenter(double x, double y)
+{
+    const std::optional<PickedPoint> picked = pick(x, y);
+    if (!picked)
+        return;
+    using namespace camera_math;
+    Camera camera = state_.camera;
+    const CameraAxes axes = camera_axes(camera);
+    const Vec3 way = picked->point_mm - camera.target;
+    const Vec3 across = way - axes.forward * dot(way, axes.forward);
+    camera.eye = camera.eye + across; // at the same distance
+    camera.target = picked->point_mm;
+    look_along(camera);
+}
+
+void Viewer::zoom_at(double x, double y, double scale)
+{
+    zoom_point_ = point_under(x, y);
+    state_.camera = zoom_about(state_.camera, zoom_point_, scale);
+    changed(true);
+}
+
+// ---- events --------------------------------------------------------------------------------------------------------
+
+void Viewer::drag_to(double x, double y)
+{
+    const double dx = x - pointer_x_, dy = y - pointer_y_;
+    switch (drag_of(*preset_, buttons_, drag_mods_)) {
+    case Drag::Orbit:
+        state_.camera = orbit(state_.camera, dx, dy, size(), turning_, {0, 0, 1});
+        break;
+    case Drag::Pan:
+        state_.camera = pan(state_.camera, dx, dy, size());
+        break;
+    case Drag::Zoom:
+        state_.camera = zoom_about(state_.camera, zoom_point_, std::exp(dy / kZoomDragPixels));
+        break;
+    case Drag::None:
+        return;
+    }
+    changed(true);
+}
+
+void Viewer::handle(const InputEvent& event)
+{
+    using Kind = InputEvent::Kind;
+    switch (event.kind) {
+    case Kind::Move:
+        if (buttons_ != 0 && std::hypot(event.x - press_x_, event.y - press_y_) > kClickPixels)
+            dragged_ = true;
+        if (buttons_ != 0 && dragged_ && model_)
+            drag_to(event.x, event.y);
+        pointer_x_ = event.x;
+        pointer_y_ = event.y;
+        break;
+    case Kind::Leave:
+        pointer_x_ = pointer_y_ = -1;
+        break;
+    case Kind::Button:
+        if (event.down) {
+            if (buttons_ == 0) {
+                press_x_ = pointer_x_;
+                press_y_ = pointer_y_;
+                dragged_ = false;
+                if (model_)
+                    zoom_point_ = point_under(pointer_x_, pointer_y_);
+            }
+            buttons_ |= 1u << event.code;
+            drag_mods_ = event.mods;
+        } else if ((buttons_ & 1u << event.code) != 0) {
+            buttons_ &= ~(1u << event.code);
+            if (event.code == kLeftButton && !dragged_ && buttons_ == 0)
+                click(pointer_x_, pointer_y_);
+            if (dragged_)
+                changed(true); // rests from now on
+        }
+        break;
+    case Kind::Scroll:
+        if (model_ && event.y != 0)
+            zoom_at(pointer_x_, pointer_y_, std::pow(kZoomStep, event.y));
+        break;
+    case Kind::Key:
+        if (event.down)
+            if (const std::optional<Action> action = action_of(*preset_, {event.code, event.mods}))
+                act(*action);
+        break;
+    case Kind::Drop:
+        open(event.paths);
+        break;
+    case Kind::Close:
+        quits_ = true;
+        break;
+    case Kind::Text:
+    case Kind::Resize:
+        break;
+    }
+}
+
+void Viewer::act(Action action)
+{
+    SceneRequest& look = state_.look;
+    const auto step_file = [&](size_t step) {
+        if (files_.size() < 2)
+            return tell("there is no other file");
+        file_index_ = (file_index_ + step) % files_.size();
+        keeps_view_ = false;
+        begin_load();
+    };
+    switch (action) {
+    case Action::Quit:
+        quits_ = true;
+        return;
+    case Action::NextFile:
+        return step_file(1);
+    case Action::PreviousFile:
+        return step_file(files_.size() - 1);
+    case Action::Reload:
+        if (!files_.empty()) {
+            keeps_view_ = true;
+            begin_load();
+        }
+        return;
+    case Action::ToggleTree:
+        panels.tree = !panels.tree;
+        return;
+    case Action::ToggleLook:
+        panels.look = !panels.look;
+        return;
+    case Action::ToggleStatus:
+        panels.status = !panels.status;
+        return;
+    case Action::ToggleTimes:
+        panels.times = !panels.times;
+        return;
+    case Action::ToggleCheatSheet:
+        panels.cheat_sheet = !panels.cheat_sheet;
+        return;
+    case Action::ToggleMeasure:
+        panels.measure = !panels.measure;
+        return;
+    case Action::ToggleTurntable:
+        turning_ = turning_ == Turning::Turntable ? Turning::Free : Turning::Turntable;
+        return tell(turning_ == Turning::Turntable ? "turns like a turntable" : "turns freely");
+    case Action::ClearSelection:
+        return select(std::nullopt);
+    default:
+        break;
+    }
+    if (!model_)
+        return;
+    switch (action) {
+    case Action::Fit:
+        return frame(model_reach(image()));
+    case Action::FitSelection:
+        if (!selection_ || selection_->instance < 0)
+            return frame(model_reach(image()));
+        return frame(placement_reach(image(), uint32_t(selection_->instance)));
+    case Action::ToggleParallel:
+        return look_along(state_.camera.orthographic_mm > 0 ? with_perspective(state_.camera)
+                                                            : with_parallel_rays(state_.camera));
+    case Action::RollLeft:
+        return look_along(roll(state_.camera, -90));
+    case Action::RollRight:
+        return look_along(roll(state_.camera, 90));
+    case Action::Screenshot:
+    case Action::ScreenshotTransparent: {
+        const std::string stem = fs::path(model_->file).stem().string();
+        for (int number = 1;; ++number) {
+            const fs::path file = fs::path(screenshot_folder_) / fmt::format("{}-{}.png", stem, number);
+            std::error_code failed;
+            if (fs::exists(file, failed))
+                continue;
+            return save_picture(file.string(), action == Action::ScreenshotTransparent);
+        }
+    }
+    case Action::CycleEdges:
+        look.edges = next_of(std::array{EdgeLines::None, EdgeLines::Sharp, EdgeLines::All},
+                             look.edges.value_or(EdgeLines::None));
+        break;
+    case Action::ToggleSilhouettes:
+        look.silhouettes = !look.silhouettes.value_or(false);
+        break;
+    case Action::ToggleOcclusion:
+        look.look.occlusion.samples = look.look.occlusion.samples > 0 ? 0 : 16;
+        break;
+    case Action::ToggleShadows:
+        look.shadows =
+            look.shadows.value_or(ShadowKind::None) == ShadowKind::None ? ShadowKind::Hard : ShadowKind::None;
+        break;
+    case Action::CycleAntialias:
+        look.samples = next_of(std::array<uint32_t, 3>{1, 2, 3}, state_.samples());
+        break;
+    case Action::ToggleXray:
+        look.look.xray = look.look.xray ? std::nullopt : std::optional(0.35f);
+        break;
+    case Action::CycleMap:
+        look.look.map.map = next_of(std::array{SurfaceMap::None, SurfaceMap::Zebra, SurfaceMap::Isophotes,
+                                               SurfaceMap::CurvatureGaussian, SurfaceMap::CurvatureMean,
+                                               SurfaceMap::CurvatureMax, SurfaceMap::CurvatureMin, SurfaceMap::Draft},
+                                    look.look.map.map);
+        break;
+    case Action::ToggleSection:
+        if (look.look.section.planes.empty()) {
+            SectionPlane plane; // through the middle, what is nearer is cut away
+            for (size_t axis = 0; axis < 3; ++axis)
+                plane.point_mm[axis] = 0.5 * (image().bounds_lo_mm[axis] + image().bounds_hi_mm[axis]);
+            plane.normal = {0, -1, 0};
+            look.look.section.planes = {plane};
+        } else
+            look.look.section.planes.clear();
+        break;
+    case Action::HideSelection:
+        if (!selection_ || selection_->instance < 0)
+            return tell("nothing is selected: click a part first");
+        look.look.arrangement.hide.push_back(fmt::format("@{}", selection_->instance));
+        select(std::nullopt);
+        break;
+    case Action::IsolateSelection:
+        if (!selection_ || selection_->instance < 0)
+            return tell("nothing is selected: click a part first");
+        look.look.arrangement.only = {fmt::format("@{}", selection_->instance)};
+        break;
+    case Action::ShowAll:
+        look.look.arrangement = {};
+        break;
+    default: // the views
+        return look_from(view_of(action));
+    }
+    changed();
+}
+
+} // namespace trimray
