@@ -46,7 +46,9 @@ struct Dimension {
     DimensionKind kind = DimensionKind::Distance;
     DimensionUnit unit = DimensionUnit::Millimetre;
     double value = 0;
-    double error = 0;                        // it is off by no more, in its unit; 0: by the pack's own rounding alone
+    // it is off from the file's by no more, as far as the pack tells (border_tolerance_mm), in its unit; 0: by the
+    // pack's own rounding alone
+    double error = 0;
     std::vector<reference::Vec3> anchors_mm; // from, to; of an arc from, its centre, to; may be empty
 };
 
