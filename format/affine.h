@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cmath>
+#include <optional>
 
 namespace trimray {
 
@@ -24,6 +25,18 @@ inline bool is_singular(const double (&m)[12])
     for (int c = 0; c < 3; ++c)
         lengths *= std::sqrt(m[c] * m[c] + m[4 + c] * m[4 + c] + m[8 + c] * m[8 + c]);
     return !(std::abs(determinant(m)) > kSingularDeterminant * lengths);
+}
+
+/// The scale of a matrix that is a turn, a mirroring and one scale, within what files round to; of others nothing.
+inline std::optional<double> similarity_scale(const double (&m)[12])
+{
+    constexpr double kSimilar = 1e-5; // columns as long as each other and at right angles, as a share of their squares
+    const auto product = [&m](int a, int b) { return m[a] * m[b] + m[4 + a] * m[4 + b] + m[8 + a] * m[8 + b]; };
+    const double square = product(0, 0), most = kSimilar * square;
+    const bool similar = std::abs(product(1, 1) - square) <= most && std::abs(product(2, 2) - square) <= most &&
+                         std::abs(product(0, 1)) <= most && std::abs(product(0, 2)) <= most &&
+                         std::abs(product(1, 2)) <= most;
+    return similar ? std::optional(std::sqrt(square)) : std::nullopt;
 }
 
 } // namespace trimray

@@ -1,5 +1,7 @@
 #include "runtime/surface_map.h"
 
+#include "format/affine.h"
+
 #include <fmt/format.h>
 
 #include <cmath>
@@ -21,18 +23,6 @@ bool is_curvature(SurfaceMap map)
 double length_of(const std::array<double, 3>& v)
 {
     return std::hypot(v[0], v[1], v[2]);
-}
-
-/// Columns of the placement are as long as each other and at right angles, within this share: what files round to.
-constexpr double kSimilar = 1e-5;
-
-bool is_similarity(const InstanceRecord& instance)
-{
-    const double* t = instance.transform; // row-major 3x4
-    const auto product = [t](int a, int b) { return t[a] * t[b] + t[4 + a] * t[4 + b] + t[8 + a] * t[8 + b]; };
-    const double most = kSimilar * product(0, 0);
-    return std::abs(product(1, 1) - product(0, 0)) <= most && std::abs(product(2, 2) - product(0, 0)) <= most &&
-           std::abs(product(0, 1)) <= most && std::abs(product(0, 2)) <= most && std::abs(product(1, 2)) <= most;
 }
 
 /// The curvatures that the ends of the scale stand for.
@@ -96,7 +86,7 @@ Status check_map(const PackImage& image, const SurfaceMapLook& look)
                              fmt::format("expected two numbers, the lower first; found {}, {}", lo, hi)};
         }
         for (size_t i = 0; i < image.instances.size(); ++i)
-            if (!is_similarity(image.instances[i]))
+            if (!similarity_scale(image.instances[i].transform))
                 return Error{ErrorCode::UnsupportedPackFeature, fmt::format("instance {}", i),
                              "it is stretched along an axis; curvatures are measured on parts that are turned, "
                              "mirrored or scaled evenly"};
