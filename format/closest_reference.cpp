@@ -134,9 +134,15 @@ ClosestReference::ClosestReference(const PackImage& image)
         }
         parts_[p] = reference::BoxTree(std::move(boxes));
     }
+    place(image.instances);
+}
+
+void ClosestReference::place(std::span<const InstanceRecord> instances, std::span<const uint8_t> visible)
+{
+    placements_.clear();
     std::vector<Bounds> placed;
-    for (const InstanceRecord& instance : image.instances) {
-        const PartRecord& part = image.parts[instance.part];
+    for (const InstanceRecord& instance : instances) {
+        const PartRecord& part = image_.parts[instance.part];
         // p_world = M (origin + scale p) + m
         Placement placement;
         Matrix scaled, plain;
@@ -156,8 +162,9 @@ ClosestReference::ClosestReference(const PackImage& image)
                 placement.normal[row][c] = double(back[3 * c + row]);
         placements_.push_back(placement);
         const Bounds own = parts_[instance.part].bounds();
+        const bool is_visible = visible.empty() || visible[placed.size()] != 0;
         Bounds box;
-        for (int corner = 0; corner < 8 && !own.empty(); ++corner) {
+        for (int corner = 0; corner < 8 && is_visible && !own.empty(); ++corner) {
             const Real3 p = times(scaled, widen(own.corner(corner)));
             box.add({double(placement.moved_mm[0] + p[0]), double(placement.moved_mm[1] + p[1]),
                      double(placement.moved_mm[2] + p[2])});

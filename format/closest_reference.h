@@ -16,7 +16,9 @@
 #include "format/pack_image.h"
 #include "format/trim_reference.h"
 
+#include <cstdint>
 #include <optional>
+#include <span>
 #include <vector>
 
 namespace trimray {
@@ -51,6 +53,10 @@ public:
 
     /// Domain: a validated image, which must outlive it.
     explicit ClosestReference(const PackImage& image);
+
+    /// Has parts placed by `instances` from now on, in place of the image's own, which they differ from in their
+    /// transforms alone; where `visible` is 0 there is nothing. Shapes: as many as in the image; no `visible`: all are.
+    void place(std::span<const InstanceRecord> instances, std::span<const uint8_t> visible = {});
 
     /// The closest hit of a ray in world mm. Domain: finite, direction not 0 (it need not be unit).
     ReferenceHit closest(const reference::Ray& ray) const;

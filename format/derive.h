@@ -6,6 +6,10 @@
 #include "format/pack_image.h"
 #include "format/result.h"
 
+#include <cstdint>
+#include <span>
+#include <vector>
+
 namespace trimray {
 
 /// Fills image.leaves, the parts' leaf ranges and the Bezier patches' param from patches and control points. A leaf's
@@ -15,6 +19,19 @@ void derive_leaves(PackImage& image, const LeafOptions& options);
 
 /// Fills image.part_nodes, image.top_nodes and the parts' node ranges. Reorders each part's leaves into tree order.
 void derive_trees(PackImage& image);
+
+/// The tree over placements, as PackImage's top_nodes, world_... and bounds_... have it.
+struct TopTree {
+    std::vector<BvhNode> nodes; // none: nothing is placed
+    double origin_mm[3] = {0, 0, 0};
+    double scale_mm = 1;
+    double bounds_lo_mm[3] = {0, 0, 0}, bounds_hi_mm[3] = {0, 0, 0};
+};
+
+/// The tree over `instances` where `visible` is not 0; empty: over all. Its leaves are numbers in `instances`.
+/// Shapes: as many in `visible` as in `instances`. Domain: image has its parts' trees.
+TopTree derive_top_tree(const PackImage& image, std::span<const InstanceRecord> instances,
+                        std::span<const uint8_t> visible = {});
 
 /// Fills image.cells, image.cell_entries and the faces' grids from trim points and pieces (pack_layout.h, CellEntry).
 void derive_cells(PackImage& image);

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include <tbb/parallel_for.h>
 
@@ -129,20 +130,23 @@ Box3d world_bounds(const InstanceRecord& instance, const PartRecord& part, const
 }
 
 /// The model's box in world mm: what its leaves' own boxes reach, tighter than the tree's.
-void set_bounds(PackImage& image)
+void set_bounds(const PackImage& image, std::span<const InstanceRecord> instances, std::span<const uint8_t> visible,
+                TopTree& tree)
 {
     tbb::parallel_for(0, 6, [&](int side) {
         const int c = side / 2;
         Point3 d{};
         d[c] = side % 2 == 0 ? -1 : 1;
         double reach = -kInf;
-        for (const InstanceRecord& instance : image.instances)
-            reach = std::max(reach, largest_along(image, instance, d));
-        (side % 2 == 0 ? image.bounds_lo_mm : image.bounds_hi_mm)[c] = d[c] * reach;
+        for (size_t i = 0; i < instances.size(); ++i)
+            if (visible.empty() || visible[i] != 0)
+                reach = std::max(reach, largest_along(image, instances[i], d));
+        (side % 2 == 0 ? tree.bounds_lo_mm : tree.bounds_hi_mm)[c] = d[c] * reach;
     });
 }
 
-void build_top(PackImage& image, RTCDevice device)
+TopTree build_top(const PackImage& image, std::span<const InstanceRecord> instances, std::span<const uint8_t> visible,
+                  RTCDevice device)
 {
     constexpr int kLevels = 3; // up to 64 boxes a part
     std::vector<std::vector<Box3d>> of_part(image.parts.size());
@@ -152,8 +156,10 @@ void build_top(PackImage& image, RTCDevice device)
     std::vector<Box3d> boxes;
     std::vector<uint> ids; // instances of empty parts are not in the tree
     Box3d all;
-    for (size_t i = 0; i < image.instances.size(); ++i) {
-        const InstanceRecord& instance = image.instances[i];
+    for (size_t i = 0; i < instances.size(); ++i) {
+        const InstanceRecord& instance = instances[i];
+        if (!visible.empty() && visible[i] == 0)
+            continue;
         const Box3d box = world_bounds(instance, image.parts[instance.part], of_part[instance.part]);
         if (box.empty())
             continue;
@@ -162,21 +168,20 @@ void build_top(PackImage& image, RTCDevice device)
         boxes.push_back(box);
         ids.push_back(uint(i));
     }
-    image.top_nodes.clear();
+    TopTree tree;
     if (boxes.empty())
-        return;
-    set_bounds(image);
+        return tree;
     double half = 0;
     for (int c = 0; c < 3; ++c) {
-        image.world_origin_mm[c] = 0.5 * (all.lo[c] + all.hi[c]);
+        tree.origin_mm[c] = 0.5 * (all.lo[c] + all.hi[c]);
         half = std::max(half, 0.5 * (all.hi[c] - all.lo[c]));
     }
-    image.world_scale_mm = half > 0 ? half : 1;
+    tree.scale_mm = half > 0 ? half : 1;
     std::vector<Box3f> units;
     for (Box3d box : boxes) {
         for (int c = 0; c < 3; ++c) {
-            box.lo[c] = (box.lo[c] - image.world_origin_mm[c]) / image.world_scale_mm - kBoxMargin;
-            box.hi[c] = (box.hi[c] - image.world_origin_mm[c]) / image.world_scale_mm + kBoxMargin;
+            box.lo[c] = (box.lo[c] - tree.origin_mm[c]) / tree.scale_mm - kBoxMargin;
+            box.hi[c] = (box.hi[c] - tree.origin_mm[c]) / tree.scale_mm + kBoxMargin;
         }
         units.push_back(rounded_outwards(box));
     }
@@ -185,7 +190,9 @@ void build_top(PackImage& image, RTCDevice device)
         for (uint& child : node.child)
             if (child != kBvhEmpty && (child & kBvhLeaf) != 0)
                 child = kBvhLeaf | ids[child & ~kBvhLeaf];
-    image.top_nodes = std::move(bvh.nodes);
+    tree.nodes = std::move(bvh.nodes);
+    set_bounds(image, instances, visible, tree);
+    return tree;
 }
 
 } // namespace
@@ -202,8 +209,24 @@ void derive_trees(PackImage& image)
         image.parts[p].node_count = uint(trees[p].size());
         image.part_nodes.insert(image.part_nodes.end(), trees[p].begin(), trees[p].end());
     }
-    build_top(image, device);
+    TopTree tree = build_top(image, image.instances, {}, device);
     rtcReleaseDevice(device);
+    image.top_nodes = std::move(tree.nodes);
+    if (image.top_nodes.empty())
+        return;
+    std::copy_n(tree.origin_mm, 3, image.world_origin_mm);
+    image.world_scale_mm = tree.scale_mm;
+    std::copy_n(tree.bounds_lo_mm, 3, image.bounds_lo_mm);
+    std::copy_n(tree.bounds_hi_mm, 3, image.bounds_hi_mm);
+}
+
+TopTree derive_top_tree(const PackImage& image, std::span<const InstanceRecord> instances,
+                        std::span<const uint8_t> visible)
+{
+    RTCDevice device = rtcNewDevice(nullptr);
+    TopTree tree = build_top(image, instances, visible, device);
+    rtcReleaseDevice(device);
+    return tree;
 }
 
 } // namespace trimray

@@ -38,6 +38,18 @@ Status put_pairs(const std::string& option, const Values& values, SceneNode& roo
     return Done{};
 }
 
+/// A list of names.
+Status put_names(const std::string& option, const Values& values, SceneNode& root, const char* path)
+{
+    SceneNode list;
+    list.kind = SceneNode::Kind::Array;
+    list.option = option;
+    for (const std::string& value : values)
+        list.items.push_back(words_node(option, value));
+    set_node(root, path, std::move(list));
+    return Done{};
+}
+
 /// "x,y,z:nx,ny,nz" each.
 Status put_planes(const std::string& option, const Values& values, SceneNode& root, const char* path)
 {
@@ -82,6 +94,7 @@ Status put_antialias(const std::string& option, const Values& values, SceneNode&
 constexpr const char* kDrawing = "Drawing";
 constexpr const char* kLights = "Lights and shadows";
 constexpr const char* kMaterials = "Materials and surroundings";
+constexpr const char* kPlacements = "Placements";
 constexpr const char* kSections = "Sections and maps";
 
 struct DrawOption {
@@ -126,6 +139,11 @@ constexpr DrawOption kOptions[] = {
     {"--background", "background", put_words, kMaterials, "transparent, white, black or #rrggbb [transparent]"},
     {"--environment", "environment", put_words, kMaterials,
      "A picture all around, .hdr or .exr, equirectangular: seen behind the model and in mirrors"},
+    {"--only", "placements.only", put_names, kPlacements,
+     "A part or placement by its name, a part by #N, a placement by @N, repeatable: all others are hidden"},
+    {"--hide", "placements.hide", put_names, kPlacements, "Likewise, repeatable: what is hidden"},
+    {"--explode", "placements.explode", put_words, kPlacements,
+     "Placements moved away from the model's middle by so many times their distance from there [0]"},
     {"--section", "effects.section.planes", put_planes, kSections,
      "x,y,z:nx,ny,nz, repeatable: cuts away what lies on the normal's side of a plane"},
     {"--caps", "effects.section.caps", put_words, kSections, "Cut solids: none, filled or hatched [filled]"},

@@ -1,4 +1,5 @@
-// The options that say what is drawn: lines, lights, shadows, materials, maps, sections. Each is a key of a scene file
+// The options that say what is drawn: lines, lights, shadows, materials, placements, maps,
+// sections. Each is a key of a scene file
 // too (SCENE.md); both are read by the same code.
 #pragma once
 

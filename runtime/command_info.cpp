@@ -4,6 +4,7 @@
 #include "runtime/commands.h"
 #include "runtime/effect_plan.h"
 #include "runtime/leaf_slopes.h"
+#include "runtime/pack_names.h"
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>

@@ -58,10 +58,4 @@ Json to_json(const MemoryBytes& bytes)
     return json;
 }
 
-const std::string& string_at(const PackImage& image, uint index)
-{
-    static const std::string none;
-    return index < image.strings.strings.size() ? image.strings.strings[index] : none;
-}
-
 } // namespace trimray

@@ -32,7 +32,4 @@ MemoryBytes memory_bytes(const PackImage& image);
 /// The key "borders" is there only where they are.
 Json to_json(const MemoryBytes& bytes);
 
-/// The text at `index` of the pack's strings.
-const std::string& string_at(const PackImage& image, uint index);
-
 } // namespace trimray

@@ -1,4 +1,5 @@
 #include "format/command_report.h"
+#include "runtime/arrangement.h"
 #include "runtime/command_budget.h"
 #include "runtime/command_draw.h"
 #include "runtime/command_json.h"
@@ -120,9 +121,10 @@ Result<RenderOptions> common_options(const RenderArguments& arguments, const Sce
 
 /// The pictures, in order. Fails: as cameras_for and picture_names.
 Result<std::vector<PictureJob>> plan_pictures(const RenderArguments& arguments, const std::vector<SceneCamera>& asked,
-                                              const PackImage& image, PictureSize size)
+                                              const PackImage& image, const PlacementView& placed, PictureSize size)
 {
-    const Result<std::vector<Camera>> cameras = cameras_for(arguments.view, asked, image, size.width, size.height);
+    const Result<std::vector<Camera>> cameras =
+        cameras_for(arguments.view, asked, image, placed, size.width, size.height);
     if (!cameras.ok())
         return cameras.error();
     std::vector<std::string> files{arguments.output};
@@ -149,6 +151,15 @@ void note_unmatched_rules(const PackImage& image, const SceneRequest& request)
         return;
     for (const size_t rule : table->unmatched)
         report_note(fmt::format("{}: matches no face of the pack", request.rules[rule]));
+}
+
+/// Tells of names that are nothing's, and of a model of which nothing is left.
+void note_arrangement(const ArrangedPlacements& arranged)
+{
+    for (const std::string& name : arranged.unmatched)
+        report_note(fmt::format("placements: no part or placement is called '{}'", printable(name)));
+    if (arranged.view().visible_count() == 0)
+        report_note("placements: all are hidden");
 }
 
 Json times_json(const RenderStats& stats)
@@ -301,10 +312,16 @@ int run_render(const RenderArguments& arguments)
     Result<RenderOptions> options = common_options(arguments, *request, *size, image);
     if (!options.ok())
         return report_error(options.error());
-    const Result<std::vector<PictureJob>> jobs = plan_pictures(arguments, *asked, image, *size);
+    KeptArrangement arrangement;
+    if (const auto arranged = arrangement.change_to(image, options->look.arrangement); !arranged.ok())
+        return report_error(arranged.error());
+    const PlacementView placed = arrangement.view(image);
+    const Result<std::vector<PictureJob>> jobs = plan_pictures(arguments, *asked, image, placed, *size);
     if (!jobs.ok())
         return report_error(jobs.error());
     note_unmatched_rules(image, *request);
+    if (arrangement.arranged() != nullptr)
+        note_arrangement(*arrangement.arranged());
     std::string note;
     const Result<std::unique_ptr<Tracer>> tracer = make_tracer(*scene, arguments.device, note);
     if (!tracer.ok())
@@ -313,7 +330,8 @@ int run_render(const RenderArguments& arguments)
         report_note(note);
 
     options->camera = jobs->front().from;
-    const PackFacts facts = pack_facts(image);
+    PackFacts facts = pack_facts(image);
+    facts.shown_instances = placed.visible_count();
     const EffectPlan plan = effect_plan(facts, *options, (*tracer)->device_kind());
     if ((plan.look & kLookCaps) != 0 && facts.open_parts > 0)
         report_note(fmt::format("--caps: {} of {} parts are not closed; caps there are only where faces happen to "
@@ -415,6 +433,7 @@ void register_render(CLI::App& app, int& exit_code)
         "  trimray render model.tray -o cut.png --section 0,0,10:0,0,1 --caps hatched\n"
         "  trimray render model.tray -o parts.png --material part=Cover,opacity=0.3 --material "
         "pack_color=#ff0000,mirror=0.4\n"
+        "  trimray render model.tray -o inside.png --hide Cover --explode 0.5\n"
         "  trimray render model.tray -o zebra.png --map zebra --stripes 20\n"
         "  trimray render model.tray -o picture.png --scene scene.json\n"
         "  trimray render model.tray -o turn_%03d.png --turntable 36\n"

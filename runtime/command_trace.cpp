@@ -121,22 +121,23 @@ Result<PictureSize> parse_size(const std::string& text, uint32_t samples)
     return size;
 }
 
-Reach model_reach(const PackImage& image)
+Reach model_reach(const PackImage& image, const PlacementView& placed)
 {
-    return [&image](const std::array<double, 3>& direction) {
+    return [&image, placed](const std::array<double, 3>& direction) {
         double largest = -std::numeric_limits<double>::infinity();
-        for (const InstanceRecord& instance : image.instances)
-            largest = std::max(largest, largest_along(image, instance, direction));
+        for (size_t i = 0; i < placed.instances.size(); ++i)
+            if (placed.shows(i))
+                largest = std::max(largest, largest_along(image, placed.instances[i], direction));
         return largest;
     };
 }
 
 Result<Camera> camera_of(const SceneCamera& asked, const PackImage& image, uint32_t width, uint32_t height)
 {
-    return camera_of(asked, image, model_reach(image), width, height);
+    return camera_of(asked, image, model_reach(image, image), width, height);
 }
 
-Result<Camera> camera_of(const SceneCamera& asked, const PackImage& image, const Reach& framed, uint32_t width,
+Result<Camera> camera_of(const SceneCamera& asked, const PlacementView& placed, const Reach& framed, uint32_t width,
                          uint32_t height)
 {
     Camera camera;
@@ -157,7 +158,7 @@ Result<Camera> camera_of(const SceneCamera& asked, const PackImage& image, const
     camera.eye = *asked.eye;
     for (size_t axis = 0; axis < 3; ++axis)
         camera.target[axis] =
-            asked.target ? (*asked.target)[axis] : 0.5 * (image.bounds_lo_mm[axis] + image.bounds_hi_mm[axis]);
+            asked.target ? (*asked.target)[axis] : 0.5 * (placed.bounds_lo_mm[axis] + placed.bounds_hi_mm[axis]);
     camera.up = asked.up.value_or(std::array<double, 3>{0, 0, 1});
     if (camera.eye == camera.target)
         return Error{ErrorCode::Usage, asked.where,

@@ -3,6 +3,7 @@
 
 #include "format/result.h"
 #include "runtime/picture_size.h"
+#include "runtime/placement_view.h"
 #include "runtime/scene_request.h"
 #include "runtime/tracer.h"
 
@@ -43,12 +44,12 @@ Result<PictureSize> parse_size(const std::string& text, uint32_t samples);
 /// Without an eye: the model framed whole from the named view. Without a target: the middle of the model.
 /// Fails: Usage (no such view; an eye in the model's middle).
 Result<Camera> camera_of(const SceneCamera& asked, const PackImage& image, uint32_t width, uint32_t height);
-/// The same where `framed`, not the model, is framed.
-Result<Camera> camera_of(const SceneCamera& asked, const PackImage& image, const Reach& framed, uint32_t width,
+/// The same where the middle is that of what is placed, and `framed` is framed.
+Result<Camera> camera_of(const SceneCamera& asked, const PlacementView& placed, const Reach& framed, uint32_t width,
                          uint32_t height);
 
-/// Of all instances of the pack, which must outlive it.
-Reach model_reach(const PackImage& image);
+/// Of all placements that are visible; what is placed and the pack must outlive it.
+Reach model_reach(const PackImage& image, const PlacementView& placed);
 
 /// Of the model's bounds.
 double diagonal_mm(const PackImage& image);

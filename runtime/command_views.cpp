@@ -83,16 +83,16 @@ double step_angle(uint32_t step, uint32_t steps)
 }
 
 /// The cameras of a turn around the axis through the model's middle, counter-clockwise seen from its end.
-Result<std::vector<Camera>> turn_around(const SceneCamera& asked, const PackImage& image, uint32_t steps,
-                                        uint32_t width, uint32_t height)
+Result<std::vector<Camera>> turn_around(const SceneCamera& asked, const PackImage& image, const PlacementView& placed,
+                                        uint32_t steps, uint32_t width, uint32_t height)
 {
     const Vec3 axis = unit(asked.up.value_or(Vec3{0, 0, 1}));
     Vec3 middle;
     for (size_t i = 0; i < 3; ++i)
-        middle[i] = 0.5 * (image.bounds_lo_mm[i] + image.bounds_hi_mm[i]);
+        middle[i] = 0.5 * (placed.bounds_lo_mm[i] + placed.bounds_hi_mm[i]);
     // to be framed whole at every step is what the model is at all angles at once: a point p turned by R about the
     // middle m reaches (R (p - m) + m) . d = p . R'd + m . (d - R'd)
-    const Reach reach = model_reach(image);
+    const Reach reach = model_reach(image, placed);
     const Reach of_all = [&](const Vec3& d) {
         double largest = -std::numeric_limits<double>::infinity();
         for (uint32_t step = 0; step < steps; ++step) {
@@ -104,7 +104,7 @@ Result<std::vector<Camera>> turn_around(const SceneCamera& asked, const PackImag
         }
         return largest;
     };
-    const Result<Camera> first = camera_of(asked, image, of_all, width, height);
+    const Result<Camera> first = camera_of(asked, placed, of_all, width, height);
     if (!first.ok())
         return first.error();
     std::vector<Camera> cameras;
@@ -185,13 +185,14 @@ Result<std::vector<SceneCamera>> cameras_asked(const ViewArguments& arguments,
 }
 
 Result<std::vector<Camera>> cameras_for(const ViewArguments& arguments, const std::vector<SceneCamera>& asked,
-                                        const PackImage& image, uint32_t width, uint32_t height)
+                                        const PackImage& image, const PlacementView& placed, uint32_t width,
+                                        uint32_t height)
 {
     if (arguments.turntable)
-        return turn_around(asked.front(), image, *arguments.turntable, width, height);
+        return turn_around(asked.front(), image, placed, *arguments.turntable, width, height);
     std::vector<Camera> cameras;
     for (const SceneCamera& camera : asked) {
-        const Result<Camera> resolved = camera_of(camera, image, model_reach(image), width, height);
+        const Result<Camera> resolved = camera_of(camera, placed, model_reach(image, placed), width, height);
         if (!resolved.ok())
             return resolved.error();
         cameras.push_back(*resolved);

@@ -5,6 +5,7 @@
 #include "format/pack_image.h"
 #include "format/result.h"
 #include "runtime/camera.h"
+#include "runtime/placement_view.h"
 #include "runtime/scene_request.h"
 
 #include <cstddef>
@@ -35,10 +36,11 @@ void add_view_options(CLI::App& command, ViewArguments& arguments);
 Result<std::vector<SceneCamera>> cameras_asked(const ViewArguments& arguments,
                                                const std::vector<SceneCamera>& scene_cameras);
 
-/// The same, resolved for a pack; with a turntable, its steps. A model that is framed whole is so at every step.
-/// Fails: as camera_of.
+/// The same, resolved for what is placed of a pack; with a turntable, its steps. A model that is framed whole is so at
+/// every step. Fails: as camera_of.
 Result<std::vector<Camera>> cameras_for(const ViewArguments& arguments, const std::vector<SceneCamera>& asked,
-                                        const PackImage& image, uint32_t width, uint32_t height);
+                                        const PackImage& image, const PlacementView& placed, uint32_t width,
+                                        uint32_t height);
 
 /// The names of `count` pictures: `output` with its one %d or %0Nd replaced by 1, 2, ..., or with _1, _2, ... (as many
 /// digits for all) before its ending. Fails: Usage (another or a second %).

@@ -273,10 +273,10 @@ inline double center_blur(const InstanceView& view, const PixelRect& rect)
         if (count > 0)
             project_leaves(scene, std::span(leaves, count), index, view, rect, found);
     };
-    if (view.alone || image.instances.size() == 1) {
-        enter(view.alone.value_or(0));
-    } else if (!image.top_nodes.empty()) {
-        walk(image.top_nodes.data(), Frustum(world_view(image, view), rect), scratch.stack, work, enter);
+    if (view.alone) {
+        enter(*view.alone);
+    } else if (!view.placed.top_nodes.empty()) {
+        walk(view.placed.top_nodes.data(), Frustum(world_view(view), rect), scratch.stack, work, enter);
     }
     std::vector<CandidateKey>& keys = scratch.keys;
     keys.clear();

@@ -136,10 +136,10 @@ public:
         work_.free_rays += lane_count(rays.alive);
         recent_.clear();
         const auto enter = [&](uint instance) HWY_ATTR { meet_instance(rays, instance, hit); };
-        if (image_.instances.size() == 1)
-            enter(0);
-        else if (!image_.top_nodes.empty())
-            walk(image_.top_nodes.data(), tree_packet(rays.origin, rays.direction), hit, enter);
+        if (job_.view.alone)
+            enter(*job_.view.alone);
+        else if (const auto& top_nodes = job_.view.placed.top_nodes; !top_nodes.empty())
+            walk(top_nodes.data(), tree_packet(rays.origin, rays.direction), hit, enter);
         return hit;
     }
 

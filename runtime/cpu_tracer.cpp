@@ -1,3 +1,4 @@
+#include "runtime/arrangement.h"
 #include "runtime/cpu_lanes.h"
 #include "runtime/effect_plan.h"
 #include "runtime/eye_side.h"
@@ -25,7 +26,7 @@ namespace {
 
 constexpr uint32_t kLookDone = kLookLights | kLookShadows | kLookSoftShadows | kLookOcclusion | kLookMap |
                                kLookSection | kLookCaps | kLookMaterials | kLookTransparency | kLookMirrors |
-                               kLookEnvironment | kLookOrthographic;
+                               kLookEnvironment | kLookOrthographic | kLookArrangement;
 
 class CpuTracer final : public Tracer {
 public:
@@ -59,10 +60,15 @@ public:
         const Result<MaterialTable> materials = resolve_materials(scene_->pack.image, options.look);
         if (!materials.ok())
             return materials.error();
+        const Result<bool> rearranged = arrangement_.change_to(scene_->pack.image, options.look.arrangement);
+        if (!rearranged.ok())
+            return rearranged.error();
+        if (*rearranged)
+            to_part_.clear();
         const bool asks_free_rays = (options.shade && (has_light_rays(options.look) || has_mirrors(options.look))) ||
                                     !options.look.section.planes.empty();
         if (asks_free_rays && to_part_.empty())
-            to_part_ = world_to_part(scene_->pack.image);
+            to_part_ = world_to_part(arrangement_.view(scene_->pack.image));
         if (asks_borders && !border_cells_)
             border_cells_ = make_border_cells(scene_->pack.image);
         if (*trim == TrimMode::Kd && !cpu_scene_->kd_trims().ok())
@@ -89,7 +95,8 @@ public:
         stats.buffer_bytes = stats.kd_bytes + stats.border_bytes + (has_effects(options) ? edge_map_.size_bytes() : 0) +
                              (asks_free_rays ? to_part_.size() * sizeof(WorldToPart) : 0) +
                              (options.shade && has_materials(options.look) ? materials->size_bytes() : 0) +
-                             kept_.packets.size() * sizeof(KeptPacket) + frame.map_value.size() * sizeof(float);
+                             arrangement_.size_bytes() + kept_.packets.size() * sizeof(KeptPacket) +
+                             frame.map_value.size() * sizeof(float);
         return frame;
     }
 
@@ -98,8 +105,9 @@ private:
                            uint32_t frame_number, const RunEach& run_each, Frame& frame)
     {
         const CameraRays rays = camera_rays(options.camera, options.width, options.height);
-        View view = make_view(cpu_scene_->image, rays, options.width, options.height);
-        const std::vector<uint8_t> outside = seen_from_outside(*cpu_scene_, options.camera.eye);
+        const PlacementView placed = arrangement_.view(scene_->pack.image);
+        View view = make_view(placed, rays, options.width, options.height);
+        const std::vector<uint8_t> outside = seen_from_outside(*cpu_scene_, placed, options.camera.eye);
         for (size_t i = 0; i < outside.size(); ++i)
             view.instances[i].outside = outside[i] != 0 && options.look.section.planes.empty(); // it shows the inside
         BlockJob job{*cpu_scene_, view, options.width, options.height, trim, options.shade, options.error_px};
@@ -115,10 +123,9 @@ private:
         const bool is_lit = options.shade && has_lights(options.look), is_cut = !options.look.section.planes.empty();
         const ViewRays picture{std::to_array(view.eye_mm), std::to_array(view.w0), std::to_array(view.step_x),
                                std::to_array(view.step_y), view.tau_ref};
-        const PackImage& image = scene_->pack.image;
-        const PlaceView places = place_view(image, picture);
-        const FrameLights lights = is_lit ? frame_lights(image, options) : FrameLights{};
-        const SectionView section = is_cut ? section_view(image, options.look.section, picture) : SectionView{};
+        const PlaceView places = place_view(placed, picture);
+        const FrameLights lights = is_lit ? frame_lights(placed, options) : FrameLights{};
+        const SectionView section = is_cut ? section_view(placed, options.look.section, picture) : SectionView{};
         if (options.shade && has_materials(options.look))
             job.materials = &materials;
         if (options.shade)
@@ -186,7 +193,8 @@ private:
     tbb::enumerable_thread_specific<BlockScratch> scratch_;
     std::optional<BorderCells> border_cells_; // once a picture asks for borders
     EdgeMap edge_map_;
-    std::vector<WorldToPart> to_part_; // once a picture needs rays from elsewhere than the eye
+    KeptArrangement arrangement_;
+    std::vector<WorldToPart> to_part_; // of the arrangement, once a picture needs rays from elsewhere than the eye
     KeptHits kept_; // of the picture at hand, where ClosestPolicy::Stochastic makes it in several frames
 };
 
@@ -208,11 +216,12 @@ Result<std::unique_ptr<Tracer>> make_cpu_tracer(std::shared_ptr<const Scene> sce
 
 RayHit trace_ray(const Scene& scene, const std::array<double, 3>& origin_mm, const std::array<double, 3>& direction)
 {
-    return trace_one(*prepared(scene), origin_mm, direction);
+    const std::shared_ptr<const CpuScene> cpu_scene = prepared(scene);
+    return trace_one(*cpu_scene, cpu_scene->image, origin_mm, direction);
 }
 
-RayHit trace_one(const CpuScene& scene, const std::array<double, 3>& origin_mm, const std::array<double, 3>& direction,
-                 std::optional<uint32_t> instance)
+RayHit trace_one(const CpuScene& scene, const PlacementView& placed, const std::array<double, 3>& origin_mm,
+                 const std::array<double, 3>& direction, std::optional<uint32_t> instance)
 {
     RayHit result;
     std::string found;
@@ -220,8 +229,9 @@ RayHit trace_one(const CpuScene& scene, const std::array<double, 3>& origin_mm, 
     const bool has_direction = direction[0] != 0 || direction[1] != 0 || direction[2] != 0;
     if (!trace_block || !has_direction)
         return result;
-    View view = make_single_ray_view(scene.image, origin_mm, direction);
-    view.alone = instance;
+    View view = make_single_ray_view(placed, origin_mm, direction);
+    if (instance)
+        view.alone = instance;
     const BlockJob job{scene, view, 1, 1, TrimMode::Exact, false, 0.02f};
     Frame frame;
     resize(frame, 1, 1);

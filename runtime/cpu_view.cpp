@@ -83,22 +83,24 @@ InstanceView view_from(const InstanceRecord& instance, const PartRecord& part, c
 }
 
 /// Fills what follows from eye, w0, steps and plane.
-void finish_view(const PackImage& image, View& view)
+void finish_view(const PlacementView& placed, View& view)
 {
     // tau of the model's nearest corner, or of the eye or its plane where that is behind it
     double nearest = std::numeric_limits<double>::infinity();
     for (int corner = 0; corner < 8; ++corner) {
         double p[3];
         for (int i = 0; i < 3; ++i)
-            p[i] = (corner >> i & 1 ? image.bounds_hi_mm[i] : image.bounds_lo_mm[i]) - view.eye_mm[i];
+            p[i] = (corner >> i & 1 ? placed.bounds_hi_mm[i] : placed.bounds_lo_mm[i]) - view.eye_mm[i];
         nearest = std::min(nearest, dot(p, view.w0));
     }
     nearest -= view.plane_mm;
     view.depth_ref = nearest > 0 && nearest < 1e30 ? double(float(nearest)) : 0;
     view.tau_ref = view.plane_mm + view.depth_ref;
-    view.instances.reserve(image.instances.size());
-    for (const InstanceRecord& instance : image.instances)
-        view.instances.push_back(view_from(instance, image.parts[instance.part], view));
+    view.placed = placed;
+    view.alone = placed.alone;
+    view.instances.reserve(placed.instances.size());
+    for (const InstanceRecord& instance : placed.instances)
+        view.instances.push_back(view_from(instance, placed.parts[instance.part], view));
 }
 
 /// The box that the children of the part's root fill.
@@ -184,7 +186,7 @@ const Result<KdTrims>& CpuScene::kd_trims() const
     return *kd_;
 }
 
-View make_view(const PackImage& image, const CameraRays& rays, uint32_t width, uint32_t height)
+View make_view(const PlacementView& placed, const CameraRays& rays, uint32_t width, uint32_t height)
 {
     View view;
     view.plane_mm = rays.plane_mm;
@@ -199,11 +201,11 @@ View make_view(const PackImage& image, const CameraRays& rays, uint32_t width, u
         view.step_x[i] = rays.step_x[i] / length;
         view.step_y[i] = rays.step_y[i] / length;
     }
-    finish_view(image, view);
+    finish_view(placed, view);
     return view;
 }
 
-View make_single_ray_view(const PackImage& image, const std::array<double, 3>& origin_mm,
+View make_single_ray_view(const PlacementView& placed, const std::array<double, 3>& origin_mm,
                           const std::array<double, 3>& direction)
 {
     constexpr double kPixel = 1e-4;
@@ -227,18 +229,18 @@ View make_single_ray_view(const PackImage& image, const std::array<double, 3>& o
     for (double& x : view.step_x)
         x *= kPixel / across;
     cross(view.w0, view.step_x, view.step_y);
-    finish_view(image, view);
+    finish_view(placed, view);
     return view;
 }
 
-InstanceView world_view(const PackImage& image, const View& view)
+InstanceView world_view(const View& view)
 {
     InstanceRecord world{};
     world.transform[0] = world.transform[5] = world.transform[10] = 1;
     PartRecord unit{};
     for (int i = 0; i < 3; ++i)
-        unit.origin_mm[i] = image.world_origin_mm[i];
-    unit.scale_mm = image.world_scale_mm;
+        unit.origin_mm[i] = view.placed.world_origin_mm[size_t(i)];
+    unit.scale_mm = view.placed.world_scale_mm;
     return view_from(world, unit, view);
 }
 

@@ -9,6 +9,7 @@
 #include "format/derive_kd.h"
 #include "format/pack_image.h"
 #include "runtime/camera.h"
+#include "runtime/placement_view.h"
 #include "runtime/tracer.h"
 
 #include <array>
@@ -66,22 +67,23 @@ struct InstanceView {
 };
 
 struct View {
+    PlacementView placed;
     double eye_mm[3], w0[3], step_x[3], step_y[3]; // world
     double tau_ref = 0;                            // mm; distances are stored relative to this
     double plane_mm = 0;                           // CameraRays::plane_mm: what has a smaller tau is not seen
     double depth_ref = 0;                          // tau_ref - plane_mm, a float's value
     std::vector<InstanceView> instances;
-    std::optional<uint32_t> alone; // the only instance that rays meet
+    std::optional<uint32_t> alone; // the only instance that rays meet, without the tree
 };
 
 /// Rays of a camera. x runs from -width / 2 to width / 2.
-View make_view(const PackImage& image, const CameraRays& rays, uint32_t width, uint32_t height);
+View make_view(const PlacementView& placed, const CameraRays& rays, uint32_t width, uint32_t height);
 /// The ray at x = y = 0 alone; pixels are 1e-4 wide.
-View make_single_ray_view(const PackImage& image, const std::array<double, 3>& origin_mm,
+View make_single_ray_view(const PlacementView& placed, const std::array<double, 3>& origin_mm,
                           const std::array<double, 3>& direction);
 
 /// The top tree's units seen as an instance's part.
-InstanceView world_view(const PackImage& image, const View& view);
+InstanceView world_view(const View& view);
 
 /// A rectangle of the picture, in pixels from its centre.
 struct PixelRect {

@@ -171,8 +171,20 @@ std::string open_parts_note(const PackFacts& facts)
                        facts.open_parts, counted(facts.parts, "part is", "parts are"));
 }
 
+std::string arrangement_note(const PackFacts& facts, const Arrangement& arrangement)
+{
+    return fmt::format(
+        "asked for: {} of {}{}", facts.shown_instances,
+        counted(facts.instances, "placement is shown", "placements are shown"),
+        arrangement.explode > 0
+            ? fmt::format(", farther from the model's middle by {} times its distance", arrangement.explode)
+            : "");
+}
+
 void add_geometry(const PackFacts& facts, uint32_t look, const SceneLook& scene, std::vector<EffectItem>& items)
 {
+    if ((look & kLookArrangement) != 0)
+        items.push_back({"arrangement", arrangement_note(facts, scene.arrangement)});
     if ((look & kLookOrthographic) != 0)
         items.push_back({"orthographic", "asked for: parallel rays"});
     if ((look & kLookSection) != 0)
@@ -245,6 +257,7 @@ uint32_t look_bits(const RenderOptions& options)
     uint32_t bits = 0;
     const auto add = [&bits](bool wanted, LookBit bit) { bits |= wanted ? bit : 0u; };
     add(options.camera.orthographic_mm > 0, kLookOrthographic);
+    add(look.arrangement.any(), kLookArrangement);
     add(!look.section.planes.empty(), kLookSection);
     add(!look.section.planes.empty() && look.section.caps != CapStyle::None, kLookCaps);
     add(has_map(options), kLookMap);
@@ -271,7 +284,8 @@ Status check_look(const RenderOptions& options, uint32_t done, const std::string
         LookBit bit;
         const char *option, *what;
     };
-    constexpr Item kItems[kLookBits] = {
+    const Arrangement& arrangement = options.look.arrangement;
+    const Item items[kLookBits] = {
         {kLookLights, "--light", "lights"},
         {kLookShadows, "--shadows", "shadows"},
         {kLookSoftShadows, "--shadows", "soft shadows"},
@@ -284,9 +298,14 @@ Status check_look(const RenderOptions& options, uint32_t done, const std::string
         {kLookCaps, "--caps", "caps of sections"},
         {kLookEnvironment, "--environment", "environments"},
         {kLookOrthographic, "--ortho", "parallel rays"},
+        {kLookArrangement,
+         !arrangement.hide.empty()   ? "--hide"
+         : !arrangement.only.empty() ? "--only"
+                                     : "--explode",
+         "arrangements of placements"},
     };
     const uint32_t missing = look_bits(options) & ~done;
-    for (const Item& item : kItems)
+    for (const Item& item : items)
         if ((missing & item.bit) != 0)
             return Error{ErrorCode::UnsupportedFormat, item.option,
                          fmt::format("{} are not in this version of the tracer {}", item.what, tracer)};

@@ -33,11 +33,12 @@ enum LookBit : uint32_t {
     kLookCaps = 1u << 9,
     kLookEnvironment = 1u << 10,
     kLookOrthographic = 1u << 11,
+    kLookArrangement = 1u << 12, // placements are hidden or moved
 };
-constexpr uint32_t kLookBits = 12;
+constexpr uint32_t kLookBits = 13;
 
-/// Bits of what `options` asks for. Without shading only sections, the camera and maps
-/// that measure count: all else changes colours alone.
+/// Bits of what `options` asks for. Without shading only arrangements, sections, the camera and
+/// maps that measure count: all else changes colours alone.
 uint32_t look_bits(const RenderOptions& options);
 
 /// Whether a tracer does all that `options` asks for. `done`: LookBit of what it does. Fails: UnsupportedFormat, at the
@@ -45,8 +46,9 @@ uint32_t look_bits(const RenderOptions& options);
 Status check_look(const RenderOptions& options, uint32_t done, const std::string& tracer);
 
 struct EffectPlan {
-    std::vector<EffectItem> items; // in a fixed order: kinds of patches, trims, placements, colours, search, camera,
-                                   // sections, maps, shading, what is drawn over it, lights, materials, device
+    std::vector<EffectItem>
+        items; // in a fixed order: kinds of patches, trims, placements, colours, search, arrangement,
+               // camera, sections, maps, shading, what is drawn over it, lights, materials, device
     // What the tracers specialise themselves from
     uint32_t kinds = 0; // bit kKind...: such patches are met
     bool rational = false, trims = false, rims = false;

@@ -50,7 +50,7 @@ bool is_soft(const Light& light)
     return light.shadows && (light.kind == LightKind::Directional ? light.half_angle_deg : light.radius_mm) > 0;
 }
 
-LightRecord light_record(const PackImage& image, const Light& light)
+LightRecord light_record(const PlacementView& placed, const Light& light)
 {
     LightRecord record{};
     std::copy(light.color.begin(), light.color.end(), record.color);
@@ -66,8 +66,8 @@ LightRecord light_record(const PackImage& image, const Light& light)
     case LightKind::Point:
         record.kind = kLightPoint;
         for (size_t i = 0; i < 3; ++i)
-            record.place[i] = float((light.position_mm[i] - image.world_origin_mm[i]) / image.world_scale_mm);
-        record.radius = float(light.radius_mm / image.world_scale_mm);
+            record.place[i] = float((light.position_mm[i] - placed.world_origin_mm[i]) / placed.world_scale_mm);
+        record.radius = float(light.radius_mm / placed.world_scale_mm);
         break;
     }
     record.kind |= (light.shadows ? kLightShadows : 0) | (is_soft(light) ? kLightSoft : 0);
@@ -145,13 +145,13 @@ Status check_lights(const SceneLook& look)
     return Done{};
 }
 
-PlaceView place_view(const PackImage& image, const ViewRays& rays)
+PlaceView place_view(const PlacementView& placed, const ViewRays& rays)
 {
-    const double per_scale = 1 / image.world_scale_mm;
+    const double per_scale = 1 / placed.world_scale_mm;
     PlaceView view{};
     Vec3 place;
     for (size_t i = 0; i < 3; ++i)
-        place[i] = (rays.eye_mm[i] + rays.tau_ref * rays.w0[i] - image.world_origin_mm[i]) * per_scale;
+        place[i] = (rays.eye_mm[i] + rays.tau_ref * rays.w0[i] - placed.world_origin_mm[i]) * per_scale;
     store(place, view.place);
     store(scaled(rays.step_x, rays.tau_ref * per_scale), view.place_x);
     store(scaled(rays.step_y, rays.tau_ref * per_scale), view.place_y);
@@ -164,10 +164,10 @@ PlaceView place_view(const PackImage& image, const ViewRays& rays)
     return view;
 }
 
-FrameLights frame_lights(const PackImage& image, const RenderOptions& options)
+FrameLights frame_lights(const PlacementView& placed, const RenderOptions& options)
 {
     const SceneLook& look = options.look;
-    const double per_scale = 1 / image.world_scale_mm;
+    const double per_scale = 1 / placed.world_scale_mm;
     FrameLights out{};
     LightView& view = out.view;
     view.error_px = options.error_px;
@@ -180,12 +180,12 @@ FrameLights frame_lights(const PackImage& image, const RenderOptions& options)
         view.turn_sin[i] = float(std::sin(angle));
     }
     for (const Light& light : look.lights)
-        out.lights.push_back(light_record(image, light));
+        out.lights.push_back(light_record(placed, light));
     const bool hides = look.occlusion.samples > 0 && look.lights.empty();
     view.sky = look.sky.value_or(hides ? 3.0f : 1.0f);
     if (out.lights.empty()) {
         const float eye = hides ? 0.4f : 1.0f;
-        out.lights.push_back(light_record(image, {.kind = LightKind::Eye, .color = {eye, eye, eye}}));
+        out.lights.push_back(light_record(placed, {.kind = LightKind::Eye, .color = {eye, eye, eye}}));
     }
     view.light_count = uint32_t(out.lights.size());
     const bool soft = std::any_of(look.lights.begin(), look.lights.end(), is_soft);
@@ -199,12 +199,12 @@ FrameLights frame_lights(const PackImage& image, const RenderOptions& options)
     return out;
 }
 
-std::vector<WorldToPart> world_to_part(const PackImage& image)
+std::vector<WorldToPart> world_to_part(const PlacementView& placed)
 {
     std::vector<WorldToPart> out;
-    out.reserve(image.instances.size());
-    for (const InstanceRecord& instance : image.instances) {
-        const PartRecord& part = image.parts[instance.part];
+    out.reserve(placed.instances.size());
+    for (const InstanceRecord& instance : placed.instances) {
+        const PartRecord& part = placed.parts[instance.part];
         const double* m = instance.transform;
         // part mm -> world mm; rows of its inverse are cross products of its columns over the determinant
         const double a[3] = {m[0], m[4], m[8]}, b[3] = {m[1], m[5], m[9]}, c[3] = {m[2], m[6], m[10]};
@@ -219,12 +219,12 @@ std::vector<WorldToPart> world_to_part(const PackImage& image)
             const Vec3 row = scaled(rows[i], 1 / (determinant * part.scale_mm));
             double offset = -part.origin_mm[i] / part.scale_mm;
             for (size_t j = 0; j < 3; ++j) {
-                offset += row[j] * (image.world_origin_mm[j] - m[4 * j + 3]);
-                row_out[i][j] = float(row[j] * image.world_scale_mm);
+                offset += row[j] * (placed.world_origin_mm[j] - m[4 * j + 3]);
+                row_out[i][j] = float(row[j] * placed.world_scale_mm);
             }
             to.offset[i] = float(offset);
         }
-        to.scale = float(image.world_scale_mm / (part.scale_mm * std::cbrt(std::abs(determinant))));
+        to.scale = float(placed.world_scale_mm / (part.scale_mm * std::cbrt(std::abs(determinant))));
         out.push_back(to);
     }
     return out;

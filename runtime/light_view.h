@@ -2,7 +2,7 @@
 // look.
 #pragma once
 
-#include "format/pack_image.h"
+#include "runtime/placement_view.h"
 #include "runtime/tracer.h"
 #include "shaders/light_layout.h"
 
@@ -42,11 +42,11 @@ bool has_light_rays(const SceneLook& look);
 Status check_lights(const SceneLook& look);
 
 /// Domain: check_lights is ok.
-FrameLights frame_lights(const PackImage& image, const RenderOptions& options);
+FrameLights frame_lights(const PlacementView& placed, const RenderOptions& options);
 
-PlaceView place_view(const PackImage& image, const ViewRays& rays);
+PlaceView place_view(const PlacementView& placed, const ViewRays& rays);
 
 /// By instance.
-std::vector<WorldToPart> world_to_part(const PackImage& image);
+std::vector<WorldToPart> world_to_part(const PlacementView& placed);
 
 } // namespace trimray

@@ -1,5 +1,7 @@
 #include "runtime/materials.h"
 
+#include "runtime/pack_names.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -31,16 +33,10 @@ bool holds(char face, char instance)
     return face != kNever && ((face & (kNeedsName | kNeedsColor)) & ~instance) == 0;
 }
 
-const std::string& name_of(const PackImage& image, uint name)
-{
-    static const std::string none;
-    return name < image.strings.strings.size() ? image.strings.strings[name] : none;
-}
-
 /// Whether a rule names a part: by its name or by "#" and its number.
 bool names_part(const PackImage& image, const MaterialRule& rule, uint32_t part)
 {
-    return *rule.part == name_of(image, image.parts[part].name) || *rule.part == fmt::format("#{}", part);
+    return *rule.part == string_at(image, image.parts[part].name) || *rule.part == fmt::format("#{}", part);
 }
 
 /// How a rule stands for each face. Shapes: one a face.
@@ -75,7 +71,7 @@ std::vector<char> instance_states(const PackImage& image, const MaterialRule& ru
     std::vector<char> states;
     for (const InstanceRecord& instance : image.instances) {
         char state = 0;
-        if (rule.part && *rule.part == name_of(image, instance.name))
+        if (rule.part && *rule.part == string_at(image, instance.name))
             state |= kHasName;
         if (rule.pack_color &&
             rgb_of(instance.color_rgba >> 24 != 0 ? instance.color_rgba : kDefaultColor) == *rule.pack_color)

@@ -89,7 +89,7 @@ void add_faces(const PackImage& image, PackFacts& facts)
 void add_instances(const PackImage& image, PackFacts& facts)
 {
     facts.parts = image.parts.size();
-    facts.instances = image.instances.size();
+    facts.instances = facts.shown_instances = image.instances.size();
     for (const InstanceRecord& instance : image.instances) {
         const double* t = instance.transform; // row-major 3x4
         const double determinant = t[0] * (t[5] * t[10] - t[6] * t[9]) - t[1] * (t[4] * t[10] - t[6] * t[8]) +
@@ -99,14 +99,13 @@ void add_instances(const PackImage& image, PackFacts& facts)
     }
 }
 
-uint32_t stack_size(const PackImage& image)
+uint32_t part_tree_depth(const PackImage& image)
 {
     uint32_t part_depth = 1;
     for (const PartRecord& part : image.parts)
         part_depth =
             std::max(part_depth, tree_depth(std::span(image.part_nodes).subspan(part.first_node, part.node_count)));
-    // a visit takes one and leaves up to four, on each level; a root is one; the part's root comes on top
-    return 3 * (tree_depth(image.top_nodes) + part_depth) + 2;
+    return part_depth;
 }
 
 } // namespace
@@ -135,6 +134,12 @@ uint32_t PackFacts::kinds() const
     return bits;
 }
 
+uint32_t stack_size(uint32_t part_tree_depth, std::span<const BvhNode> top_nodes)
+{
+    // a visit takes one and leaves up to four, on each level; a root is one; the part's root comes on top
+    return 3 * (tree_depth(top_nodes) + part_tree_depth) + 2;
+}
+
 PackFacts pack_facts(const PackImage& image)
 {
     PackFacts facts;
@@ -144,7 +149,8 @@ PackFacts pack_facts(const PackImage& image)
     const LeafSlopes slopes = leaf_slopes(image);
     facts.bezier_leaves = slopes.leaves;
     facts.flagged_leaves = slopes.flagged;
-    facts.stack_size = stack_size(image);
+    facts.part_tree_depth = part_tree_depth(image);
+    facts.stack_size = stack_size(facts.part_tree_depth, image.top_nodes);
     return facts;
 }
 

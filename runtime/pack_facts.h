@@ -7,6 +7,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 namespace trimray {
@@ -28,6 +29,8 @@ struct PackFacts {
     size_t instances = 0, mirrored_instances = 0, colored_instances = 0;
     std::array<size_t, kEdgeClassCount> edges{}; // pieces of trims and sides of natural borders, by kEdge...
     size_t bezier_leaves = 0, flagged_leaves = 0;
+    size_t shown_instances = 0;   // all of them; less where someone counts what an arrangement leaves
+    uint32_t part_tree_depth = 0; // nodes on the longest path of the deepest part's tree
     uint32_t stack_size = 0; // waiting children at most while the trees are walked, top and deepest part's together
 
     size_t bezier_patches() const { return patches[kKindBezier]; }
@@ -38,5 +41,8 @@ struct PackFacts {
 };
 
 PackFacts pack_facts(const PackImage& image);
+
+/// PackFacts::stack_size where another tree lies over the parts' trees.
+uint32_t stack_size(uint32_t part_tree_depth, std::span<const BvhNode> top_nodes);
 
 } // namespace trimray

@@ -1,6 +1,7 @@
 // The reference for closest hits as a tracer: one ray a pixel in double, every AOV, no effects. Slow; what pictures of
 // the other tracers are compared with.
 #include "format/closest_reference.h"
+#include "runtime/arrangement.h"
 #include "runtime/effect_plan.h"
 #include "runtime/frame_effects.h"
 #include "runtime/frame_size.h"
@@ -28,8 +29,8 @@ using reference::length;
 using reference::Vec3;
 using reference::operator*;
 
-constexpr uint32_t kLookDone = kLookOrthographic; // LookBit
-constexpr uint kDefaultColor = 0xffb4b0acu;       // of what has none, sRGB
+constexpr uint32_t kLookDone = kLookOrthographic | kLookArrangement; // LookBit
+constexpr uint kDefaultColor = 0xffb4b0acu;                          // of what has none, sRGB
 
 /// The colour of a hit, linear light: what shaders/shared/shading.h computes, written anew in double.
 Vec3 shaded(uint rgba, const Vec3& normal, const Vec3& to_eye)
@@ -70,6 +71,12 @@ public:
         if (options.trim == TrimMode::Sdf || options.trim == TrimMode::Hybrid || options.trim == TrimMode::Kd)
             return Error{ErrorCode::Usage, "--device reference",
                          "counts crossings of the trims' pieces and reads nothing else; --trim must be auto or exact"};
+        const PackImage& image = scene_->pack.image;
+        const Result<bool> rearranged = arrangement_.change_to(image, options.look.arrangement);
+        if (!rearranged.ok())
+            return rearranged.error();
+        if (const PlacementView placed = arrangement_.view(image); *rearranged)
+            closest_.place(placed.instances, placed.visible);
         stats.device = device_name();
         stats.trim = TrimMode::Reference;
         stats.kd_bytes = stats.border_bytes = 0;
@@ -146,7 +153,8 @@ private:
     }
 
     std::shared_ptr<const Scene> scene_;
-    ClosestReference closest_;
+    ClosestReference closest_; // its placements are the arrangement's
+    KeptArrangement arrangement_;
 };
 
 } // namespace

@@ -180,10 +180,18 @@ public:
         const SceneNode* const node = take(key);
         if (node == nullptr)
             return false;
-        if ((node->kind != Kind::String && node->kind != Kind::Words) || node->text.empty())
-            return expected(*node, key, "a text");
-        out = node->text;
-        return true;
+        const std::string read = text_of(*node, path(key));
+        if (!read.empty())
+            out = read;
+        return !read.empty();
+    }
+    /// Empty: it is no text, or one without letters, which is a fault.
+    std::string text_of(const SceneNode& node, const std::string& path)
+    {
+        if ((node.kind == Kind::String || node.kind == Kind::Words) && !node.text.empty())
+            return node.text;
+        reading_.expected(node, path, "a text");
+        return "";
     }
     /// The number of the word that is there in `words`; -1: there is none.
     int choice(const char* key, const std::vector<std::string>& words)
@@ -442,6 +450,26 @@ SectionPlane plane_from(Reading& reading, const SceneNode& node, const std::stri
     return plane;
 }
 
+void read_names(Fields& fields, const char* key, std::vector<std::string>& names)
+{
+    constexpr size_t kMostNames = 10000;
+    std::vector<std::string> read;
+    const auto read_one = [&](const SceneNode& node, const std::string& path) {
+        read.push_back(fields.text_of(node, path));
+    };
+    if (fields.list(key, kMostNames, read_one))
+        names = std::move(read);
+}
+
+void read_placements(Reading& reading, const SceneNode& node, const std::string& path, Arrangement& arrangement)
+{
+    Fields fields(reading, node, path);
+    read_names(fields, "only", arrangement.only);
+    read_names(fields, "hide", arrangement.hide);
+    fields.number("explode", Range{0, 1e6}, arrangement.explode);
+    fields.done();
+}
+
 void read_edges(Reading& reading, const SceneNode& node, const std::string& path, SceneRequest& request)
 {
     Fields fields(reading, node, path);
@@ -555,6 +583,8 @@ void read_root(Reading& reading, const SceneNode& root, SceneRequest& request)
         request.rules.push_back(node.option.empty() ? fmt::format("{}: {}", reading.where(node, node.line), path)
                                                     : node.option);
     });
+    if (const SceneNode* const placements = fields.take("placements"))
+        read_placements(reading, *placements, "placements", request.look.arrangement);
     if (const SceneNode* const effects = fields.take("effects"))
         read_effects(reading, *effects, "effects", request);
     fields.done();

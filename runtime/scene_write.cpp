@@ -217,6 +217,14 @@ SceneNode plane_node(const SectionPlane& plane)
     return object.take();
 }
 
+void write_placements(const Arrangement& arrangement, Object& scene)
+{
+    const auto named = [](const std::string& name) { return node_of(name); };
+    scene.list("placements.only", each(arrangement.only, named));
+    scene.list("placements.hide", each(arrangement.hide, named));
+    scene.number("placements.explode", arrangement.explode, 0.0);
+}
+
 void write_map(const SurfaceMapLook& map, Object& scene)
 {
     const SurfaceMapLook plain;
@@ -329,6 +337,7 @@ std::string scene_text(const SceneRequest& request, const std::string& file)
     std::copy_if(request.look.materials.begin(), request.look.materials.end(), std::back_inserter(rules),
                  [](const MaterialRule& rule) { return gives_anything(rule.material); });
     scene.list("materials", each(rules, rule_node));
+    write_placements(request.look.arrangement, scene);
     write_effects(request, scene);
     return json_text(scene.take(), 0) + "\n";
 }

@@ -33,16 +33,16 @@ void store(const Vec3& v, float (&out)[3])
 
 constexpr double kMoreCut = 5e-6; // the top tree's units; about 40 roundings of the scene's size in single precision
 
-SectionPlaneView plane_view(const PackImage& image, const SectionPlane& plane, const ViewRays& rays)
+SectionPlaneView plane_view(const PlacementView& placed, const SectionPlane& plane, const ViewRays& rays)
 {
     const Vec3 normal = unit(plane.normal);
     Vec3 from_point, from_origin;
     for (size_t i = 0; i < 3; ++i) {
         from_point[i] = rays.eye_mm[i] + rays.tau_ref * rays.w0[i] - plane.point_mm[i];
-        from_origin[i] = plane.point_mm[i] - image.world_origin_mm[i];
+        from_origin[i] = plane.point_mm[i] - placed.world_origin_mm[i];
     }
     // a little more is cut away than was asked: faces that lie in the plane are gone, whatever rounding does
-    const double more = kMoreCut * image.world_scale_mm;
+    const double more = kMoreCut * placed.world_scale_mm;
     SectionPlaneView view{};
     view.at = float(dot(normal, from_point) + more);
     view.at_x = float(rays.tau_ref * dot(normal, rays.step_x));
@@ -51,7 +51,7 @@ SectionPlaneView plane_view(const PackImage& image, const SectionPlane& plane, c
     view.rise_x = float(dot(normal, rays.step_x));
     view.rise_y = float(dot(normal, rays.step_y));
     store(normal, view.normal);
-    view.offset = float(dot(normal, from_origin) / image.world_scale_mm - kMoreCut);
+    view.offset = float(dot(normal, from_origin) / placed.world_scale_mm - kMoreCut);
     // across: horizontal, where the plane is not
     const Vec3 up = std::abs(normal[2]) < 0.9 ? Vec3{0, 0, 1} : Vec3{0, 1, 0};
     const Vec3 across = unit(cross(up, normal));
@@ -84,7 +84,7 @@ bool has_caps(const SectionLook& look)
     return !look.planes.empty() && look.caps != CapStyle::None;
 }
 
-SectionView section_view(const PackImage& image, const SectionLook& look, const ViewRays& rays)
+SectionView section_view(const PlacementView& placed, const SectionLook& look, const ViewRays& rays)
 {
     SectionView view{};
     view.count = uint(look.planes.size());
@@ -96,7 +96,7 @@ SectionView section_view(const PackImage& image, const SectionLook& look, const 
     constexpr float kHatches = 60; // across the model
     view.hatch = 2 / kHatches;
     for (size_t i = 0; i < look.planes.size(); ++i)
-        view.planes[i] = plane_view(image, look.planes[i], rays);
+        view.planes[i] = plane_view(placed, look.planes[i], rays);
     return view;
 }
 

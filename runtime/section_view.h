@@ -1,8 +1,8 @@
 // What a picture's section planes come to for both tracers: shaders/section_layout.h, from the scene's look.
 #pragma once
 
-#include "format/pack_image.h"
 #include "runtime/light_view.h"
+#include "runtime/placement_view.h"
 #include "runtime/tracer.h"
 #include "shaders/section_layout.h"
 
@@ -15,7 +15,7 @@ namespace trimray {
 Status check_section(const SectionLook& look);
 
 /// Domain: check_section is ok and there are planes.
-SectionView section_view(const PackImage& image, const SectionLook& look, const ViewRays& rays);
+SectionView section_view(const PlacementView& placed, const SectionLook& look, const ViewRays& rays);
 
 /// Points that are inside of solids are covered by caps; a part whose faces do not close a solid has an inside only
 /// where its faces happen to enclose something.

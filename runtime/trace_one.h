@@ -10,7 +10,7 @@
 namespace trimray {
 
 /// The nearest hit as trace_ray's; of one instance alone where it is given, as if there were no other.
-RayHit trace_one(const CpuScene& scene, const std::array<double, 3>& origin_mm, const std::array<double, 3>& direction,
-                 std::optional<uint32_t> instance = {});
+RayHit trace_one(const CpuScene& scene, const PlacementView& placed, const std::array<double, 3>& origin_mm,
+                 const std::array<double, 3>& direction, std::optional<uint32_t> instance = {});
 
 } // namespace trimray

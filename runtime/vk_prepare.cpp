@@ -41,6 +41,29 @@ std::vector<uint32_t> material_words(const MaterialTable& table)
 
 } // namespace
 
+// Puts placements where the scene wants them: another tree over them, and nothing left of what hung on the last one.
+Status VulkanTracer::prepare_placements(const Arrangement& wanted)
+{
+    const PackImage& image = scene_->pack.image;
+    const Result<bool> changed = arrangement_.change_to(image, wanted);
+    if (!changed)
+        return changed.error();
+    top_tree_is_old_ = top_tree_is_old_ || *changed;
+    if (!top_tree_is_old_)
+        return Done{};
+    const PlacementView placed = arrangement_.view(image);
+    Result<VulkanBuffer> top_tree = upload_top_tree(*device_, placed.top_nodes);
+    if (!top_tree)
+        return top_tree.error();
+    buffers_[kBindTopNodes] = std::move(*top_tree);
+    buffers_[kBindToPart] = VulkanBuffer();
+    next_hits_size_ = {}; // the last picture's hits may be of what is hidden now
+    // never less than for the pack's own, so that pipelines seldom differ
+    facts_.stack_size = std::max(own_stack_size_, stack_size(facts_.part_tree_depth, placed.top_nodes));
+    top_tree_is_old_ = false;
+    return Done{};
+}
+
 // Uploads the instances as the frame sees them and makes the buffers of a band's pixels, if those there are too small.
 Status VulkanTracer::prepare_frame(const FrameSetup& setup, uint32_t rows_per_band)
 {
@@ -104,16 +127,17 @@ Status VulkanTracer::prepare_look(const RenderOptions& options, const EffectPlan
     if (!plan.lit && !plan.cut && !plan.layers && !plan.environment && !mapped)
         return Done{};
     const PackImage& image = scene_->pack.image;
+    const PlacementView placed = arrangement_.view(image);
     const SceneLook& scene_look = options.look;
     const ViewRays rays{setup.eye, setup.w0, setup.step_x, setup.step_y, setup.tau_ref};
     LookFrame look{};
-    look.places = place_view(image, rays);
+    look.places = place_view(placed, rays);
     if (plan.cut)
-        look.section = section_view(image, scene_look.section, rays);
+        look.section = section_view(placed, scene_look.section, rays);
     if (mapped)
         look.map = map_view(image, scene_look.map);
     if (plan.lit) {
-        lights_ = frame_lights(image, options);
+        lights_ = frame_lights(placed, options);
         look.light = lights_.view;
         std::copy(lights_.lights.begin(), lights_.lights.end(), look.lights);
     }
@@ -152,7 +176,7 @@ Status VulkanTracer::prepare_look(const RenderOptions& options, const EffectPlan
         layer_pixels_ = std::move(*layer);
     }
     if (free_rays && buffers_[kBindToPart].size_bytes() == 0) {
-        const std::vector<WorldToPart> to_part = world_to_part(image);
+        const std::vector<WorldToPart> to_part = world_to_part(placed);
         if (const Status uploaded = upload(kBindToPart, std::as_bytes(std::span(to_part)), "the placements"); !uploaded)
             return uploaded;
     }

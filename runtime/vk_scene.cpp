@@ -71,13 +71,13 @@ std::span<const std::byte> bytes_of(const std::vector<T>& values)
 }
 
 // tau of the model's nearest corner, or of the eye where that is behind it.
-float nearest_tau(const PackImage& image, const Vec3& eye, const Vec3& w0)
+float nearest_tau(const PlacementView& placed, const Vec3& eye, const Vec3& w0)
 {
     double nearest = std::numeric_limits<double>::infinity();
     for (int corner = 0; corner < 8; ++corner) {
         Vec3 p;
         for (size_t i = 0; i < 3; ++i)
-            p[i] = (corner >> i & 1 ? image.bounds_hi_mm[i] : image.bounds_lo_mm[i]) - eye[i];
+            p[i] = (corner >> i & 1 ? placed.bounds_hi_mm[i] : placed.bounds_lo_mm[i]) - eye[i];
         nearest = std::min(nearest, dot(p, w0));
     }
     return nearest > 0 && nearest < 1e30 ? static_cast<float>(nearest) : 0.0f;
@@ -168,14 +168,10 @@ void decide_late(const EffectPlan& plan, FrameView& view)
 
 Result<std::array<VulkanBuffer, kFrameBindings>> upload_scene(VulkanDevice& device, const PackImage& image)
 {
-    std::vector<BvhNode> top_nodes = image.top_nodes;
-    if (top_nodes.empty())
-        top_nodes.push_back(empty_node());
     std::vector<BvhNode> part_nodes = image.part_nodes;
     part_nodes.push_back(empty_node()); // for parts without any, see frame_setup
 
     const Array arrays[] = {
-        {kBindTopNodes, bytes_of(top_nodes), "the top tree"},
         {kBindPartNodes, bytes_of(part_nodes), "the parts' trees"},
         {kBindLeaves, bytes_of(image.leaves), "the leaves"},
         {kBindPatches, bytes_of(image.patches), "the patches"},
@@ -188,7 +184,17 @@ Result<std::array<VulkanBuffer, kFrameBindings>> upload_scene(VulkanDevice& devi
     std::array<VulkanBuffer, kFrameBindings> buffers;
     if (const Status uploaded = upload_arrays(device, arrays, buffers); !uploaded)
         return uploaded.error();
+    Result<VulkanBuffer> top_tree = upload_top_tree(device, image.top_nodes);
+    if (!top_tree)
+        return top_tree.error();
+    buffers[kBindTopNodes] = std::move(*top_tree);
     return buffers;
+}
+
+Result<VulkanBuffer> upload_top_tree(VulkanDevice& device, std::span<const BvhNode> nodes)
+{
+    const BvhNode none = empty_node();
+    return upload_storage(device, std::as_bytes(nodes.empty() ? std::span(&none, 1) : nodes), "the top tree");
 }
 
 Status upload_kd(VulkanDevice& device, const KdTrims& kd, std::array<VulkanBuffer, kFrameBindings>& buffers)
@@ -202,7 +208,7 @@ Status upload_kd(VulkanDevice& device, const KdTrims& kd, std::array<VulkanBuffe
     return upload_arrays(device, arrays, buffers);
 }
 
-Result<FrameSetup> frame_setup(const CpuScene& scene, const RenderOptions& options)
+Result<FrameSetup> frame_setup(const CpuScene& scene, const PlacementView& placed, const RenderOptions& options)
 {
     const PackImage& image = scene.image;
     const CameraRays rays = camera_rays(options.camera, options.width, options.height);
@@ -222,11 +228,11 @@ Result<FrameSetup> frame_setup(const CpuScene& scene, const RenderOptions& optio
     const Vec3 view_y = setup.step_y * (parallel ? rays.plane_mm : 1.0);
 
     FrameView& view = setup.view;
-    const Vec3 world_origin = std::to_array(image.world_origin_mm);
+    const Vec3 world_origin = placed.world_origin_mm;
     const double top_tau = dot(world_origin - eye_mm, setup.w0);
-    store((eye_mm + setup.w0 * top_tau - world_origin) * (1.0 / image.world_scale_mm), view.top_origin);
+    store((eye_mm + setup.w0 * top_tau - world_origin) * (1.0 / placed.world_scale_mm), view.top_origin);
     view.top_tau = static_cast<float>(top_tau);
-    view.per_world_scale = static_cast<float>(1.0 / image.world_scale_mm);
+    view.per_world_scale = static_cast<float>(1.0 / placed.world_scale_mm);
     store(setup.w0, view.w0);
     store(view_x, view.step_x);
     store(view_y, view.step_y);
@@ -240,14 +246,14 @@ Result<FrameSetup> frame_setup(const CpuScene& scene, const RenderOptions& optio
     view.line_reach_px = query.line_reach_px;
     view.border_reach_px = query.border_reach_px;
     view.line_classes = query.line_classes;
-    view.tau_ref = nearest_tau(image, eye_mm, setup.w0);
+    view.tau_ref = nearest_tau(placed, eye_mm, setup.w0);
     setup.tau_ref = rays.plane_mm + static_cast<double>(view.tau_ref);
 
-    const std::vector<uint8_t> outside = seen_from_outside(scene, eye_mm);
-    setup.instances.resize(std::max<size_t>(image.instances.size(), 1));
-    for (size_t i = 0; i < image.instances.size(); ++i) {
-        const InstanceRecord& record = image.instances[i];
-        const PartRecord& part = image.parts[record.part];
+    const std::vector<uint8_t> outside = seen_from_outside(scene, placed, eye_mm);
+    setup.instances.resize(std::max<size_t>(placed.instances.size(), 1));
+    for (size_t i = 0; i < placed.instances.size(); ++i) {
+        const InstanceRecord& record = placed.instances[i];
+        const PartRecord& part = placed.parts[record.part];
         const double* m = record.transform;
         const Vec3 column[3] = {{m[0], m[4], m[8]}, {m[1], m[5], m[9]}, {m[2], m[6], m[10]}};
         const Vec3 translation = {m[3], m[7], m[11]};

@@ -13,6 +13,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 namespace trimray {
@@ -28,6 +29,9 @@ void decide_late(const EffectPlan& plan, FrameView& view);
 /// Fails: DeviceFailed.
 Result<std::array<VulkanBuffer, kFrameBindings>> upload_scene(VulkanDevice& device, const PackImage& image);
 
+/// The top tree; one node without children where there is none. Fails: DeviceFailed.
+Result<VulkanBuffer> upload_top_tree(VulkanDevice& device, std::span<const BvhNode> nodes);
+
 /// The kd-trees' arrays by binding, beside those: all of one element if there are no trees. Fails: DeviceFailed.
 Status upload_kd(VulkanDevice& device, const KdTrims& kd, std::array<VulkanBuffer, kFrameBindings>& buffers);
 
@@ -40,6 +44,6 @@ struct FrameSetup {
     double tau_ref = 0;
 };
 /// Fails: InvalidPack (an instance whose transform has no inverse).
-Result<FrameSetup> frame_setup(const CpuScene& scene, const RenderOptions& options);
+Result<FrameSetup> frame_setup(const CpuScene& scene, const PlacementView& placed, const RenderOptions& options);
 
 } // namespace trimray

@@ -49,7 +49,7 @@ constexpr uint32_t kSoftwareRowsToGiveUp = 32;
 
 constexpr uint32_t kLookDone = kLookLights | kLookShadows | kLookSoftShadows | kLookOcclusion | kLookMap |
                                kLookSection | kLookCaps | kLookMaterials | kLookTransparency | kLookMirrors |
-                               kLookEnvironment | kLookOrthographic;
+                               kLookEnvironment | kLookOrthographic | kLookArrangement;
 
 const char* shader_name(const uint32_t* spirv)
 {
@@ -295,7 +295,9 @@ Result<Frame> VulkanTracer::render(const RenderOptions& options, RenderStats& st
 
     if (const Status ready = upload_trims(*trim); !ready)
         return ready.error();
-    const Result<FrameSetup> setup = frame_setup(*cpu_scene_, options);
+    if (const Status ready = prepare_placements(options.look.arrangement); !ready)
+        return ready.error();
+    const Result<FrameSetup> setup = frame_setup(*cpu_scene_, arrangement_.view(scene_->pack.image), options);
     if (!setup)
         return setup.error();
     if (const Status ready = prepare_frame(*setup, rows_per_band); !ready)

@@ -2,6 +2,7 @@
 // by vk_prepare.cpp, the dispatches of a band are in vk_passes.cpp, pictures as a whole in vk_tracer.cpp.
 #pragma once
 
+#include "runtime/arrangement.h"
 #include "runtime/edge_map.h"
 #include "runtime/effect_plan.h"
 #include "runtime/light_view.h"
@@ -50,7 +51,7 @@ class VulkanTracer : public Tracer {
 public:
     VulkanTracer(std::shared_ptr<const Scene> scene, std::unique_ptr<VulkanDevice> device)
         : device_(std::move(device)), scene_(std::move(scene)), cpu_scene_(prepared(*scene_)),
-          facts_(pack_facts(scene_->pack.image))
+          facts_(pack_facts(scene_->pack.image)), own_stack_size_(facts_.stack_size)
     {
     }
 
@@ -66,6 +67,7 @@ private:
     Status upload_trims(TrimMode trim);
     Result<ComputePipeline*> pipeline(std::span<const uint32_t> spirv, TrimMode trim, const RenderOptions& options,
                                       bool count);
+    Status prepare_placements(const Arrangement& wanted);
     Status prepare_frame(const FrameSetup& setup, uint32_t rows_per_band);
     Status prepare_edges(const RenderOptions& options, uint32_t rows_per_band);
     Status prepare_hits(std::initializer_list<uint32_t> bindings, size_t pixels, size_t pixel_bytes,
@@ -111,7 +113,10 @@ private:
     std::shared_ptr<const Scene> scene_;
     std::shared_ptr<const CpuScene> cpu_scene_; // which side of shells the eye is on is found on the CPU
     PackFacts facts_;
-    size_t kd_bytes_ = 0; // of the kd-trees on the device; 0: none yet
+    uint32_t own_stack_size_; // of the pack's own placements
+    KeptArrangement arrangement_;
+    bool top_tree_is_old_ = false; // that on the device is not the arrangement's
+    size_t kd_bytes_ = 0;          // of the kd-trees on the device; 0: none yet
     std::array<VulkanBuffer, kFrameBindings> buffers_;
     VulkanBuffer readback_;        // of a band's pixels
     VulkanBuffer edges_readback_;  // of a band's edge words

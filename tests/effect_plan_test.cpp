@@ -284,6 +284,14 @@ TEST(effect_plan, names_each_thing_a_scene_asks_for_and_only_that)
          {"plane", "zebra", "shading"},
          kLookMap,
          [](RenderOptions& o) { o.look.map.map = SurfaceMap::Zebra; }},
+        {"a placement hidden",
+         {"plane", "arrangement", "shading"},
+         kLookArrangement,
+         [](RenderOptions& o) { o.look.arrangement.hide = {"a"}; }},
+        {"placements moved apart",
+         {"plane", "arrangement", "shading"},
+         kLookArrangement,
+         [](RenderOptions& o) { o.look.arrangement.explode = 0.5; }},
         {"a background",
          {"plane", "shading"},
          0,
@@ -303,7 +311,8 @@ TEST(effect_plan, names_each_thing_a_scene_asks_for_and_only_that)
             EXPECT_EQ(check_look(options, ~(1u << bit), "it").ok(), !needed) << asked.name;
         }
         options.shade = false;
-        EXPECT_EQ(look_bits(options), asked.bits & (kLookOrthographic | kLookSection | kLookCaps)) << asked.name;
+        EXPECT_EQ(look_bits(options), asked.bits & (kLookArrangement | kLookOrthographic | kLookSection | kLookCaps))
+            << asked.name;
     }
 }
 

@@ -82,7 +82,7 @@ private:
         const PackImage& image = cpu_scene_->image;
         View view =
             make_view(image, camera_rays(options.camera, options.width, options.height), options.width, options.height);
-        const std::vector<uint8_t> outside = seen_from_outside(*cpu_scene_, options.camera.eye);
+        const std::vector<uint8_t> outside = seen_from_outside(*cpu_scene_, image, options.camera.eye);
         for (size_t i = 0; i < outside.size(); ++i)
             view.instances[i].outside = outside[i] != 0;
         const auto [start_u, start_v] = start_of_frame(frame_number);
@@ -90,7 +90,7 @@ private:
                               view,
                               opened_,
                               {},
-                              one_ray::tree_view(world_view(image, view), view.tau_ref),
+                              one_ray::tree_view(world_view(view), view.tau_ref),
                               one_ray::fetch_source(image, &kd),
                               options.error_px,
                               {start_u, start_v}};

@@ -1,0 +1,195 @@
+"""The viewer's window, on a display without a screen: what recordings do, and what is seen then."""
+
+import json
+import os
+import shutil
+import subprocess
+import time
+
+from case import MODEL, OPTIONS, PACK, WORK, CliTest, run
+from pictures import read_png
+
+SLOW = 4 if OPTIONS.sanitized else 1
+
+
+def start_display():
+    """The process of an X server and its name."""
+    reading, writing = os.pipe()
+    server = subprocess.Popen(
+        ["Xvfb", "-screen", "0", "1400x1000x24", "-displayfd", str(writing)],
+        pass_fds=[writing], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    os.close(writing)
+    with os.fdopen(reading) as pipe:
+        return server, ":" + pipe.readline().strip()
+
+
+class View(CliTest):
+    @classmethod
+    def setUpClass(cls):
+        cls.server, cls.display = None, None
+        if shutil.which("Xvfb"):
+            cls.server, cls.display = start_display()
+
+    @classmethod
+    def tearDownClass(cls):
+        if cls.server:
+            cls.server.terminate()
+            cls.server.wait()
+
+    def setUp(self):
+        super().setUp()
+        if not (OPTIONS.bin / "trimray-view").exists():
+            self.skipTest("no viewer in this build")
+        if not self.server:
+            self.skipTest("no Xvfb: apt install xvfb")
+        self.folder = WORK / self._testMethodName
+        self.folder.mkdir()
+        self.cache = self.folder / "cache"
+
+    def view(self, script, *arguments, files=(PACK,), timeout=120 * SLOW):
+        """Plays the lines and gives the report; the process, if it failed."""
+        recording = self.folder / "script.txt"
+        recording.write_text(script)
+        done = run("view", *files, "--play", recording, "--json", "--size", "640x480", "--device", "cpu", *arguments,
+                   env=dict(os.environ, DISPLAY=self.display, XDG_CACHE_HOME=str(self.cache)), cwd=self.folder,
+                   timeout=timeout)
+        if done.returncode != 0:
+            return done
+        return json.loads(done.stdout)
+
+    def same_as_render(self, picture, report):
+        scene = picture.with_suffix(".json")
+        size = f"{report['picture']['width']}x{report['picture']['height']}"
+        self.ok("render", report["pack"], "--scene", scene, "--size", size, "--device", "cpu", "-o",
+                self.folder / "again.png")
+        self.assertEqual((self.folder / "again.png").read_bytes(), picture.read_bytes())
+
+    def test_a_picture_is_what_render_makes_of_its_scene_file(self):
+        report = self.view("wait\npicture first.png\nwait\ndrag left 300 200 380 260\nscroll 0 3\nwait\n"
+                           "picture turned.png\nkey 5\nwait\npicture parallel.png\npicture clear.png transparent\n")
+        for name in ["first", "turned", "parallel", "clear"]:
+            self.same_as_render(self.folder / f"{name}.png", report)
+        pictures = {(self.folder / f"{name}.png").read_bytes() for name in ["first", "turned", "parallel", "clear"]}
+        self.assertEqual(len(pictures), 4)
+        self.assertTrue(report["picture"]["complete"])
+        self.assertGreater(report["camera"]["height_mm"], 0)
+
+    def test_each_presets_mouse_turns_and_moves(self):
+        moves = {"f3d": ("drag left", "drag middle"), "cad": ("drag Shift+right", "drag Ctrl+right"),
+                 "blender": ("drag middle", "drag Shift+middle")}
+        for preset, (turn, move) in moves.items():
+            start = self.view("wait\n", "--navigation", preset)["camera"]
+            turned = self.view(f"wait\n{turn} 300 200 400 200\nwait\n", "--navigation", preset)["camera"]
+            moved = self.view(f"wait\n{move} 300 200 400 200\nwait\n", "--navigation", preset)["camera"]
+            self.assertEqual(turned["target"], start["target"], preset)
+            self.assertNotEqual(turned["eye"], start["eye"], preset)
+            way = [b - a for a, b in zip(start["target"], moved["target"])]
+            self.assertGreater(sum(x * x for x in way), 0, preset)
+            for a, b, x in zip(start["eye"], moved["eye"], way):
+                self.assertAlmostEqual(b - a, x, places=6)
+
+    def test_a_click_selects_what_a_picture_has_there(self):
+        report = self.view("wait\nmove 320 220\nclick 320 220\nwait\nwindow w.png\nreport r.json\n"
+                           "click 3 3\nwait\n")
+        picked = json.loads((self.folder / "r.json").read_text())["selection"]
+        self.assertGreaterEqual(picked["face"], 0)
+        self.assertEqual(picked["instance"], 0)
+        self.assertNotIn("selection", report)  # the background is nothing
+        width, height, _ = read_png(self.folder / "w.png")
+        self.assertEqual((width, height), (640, 480))
+
+    def test_standard_views_are_those_of_render(self):
+        report = self.view("wait\nkey 7\nwait\n", "--plain")
+        up = report["camera"]["up"]
+        way = [t - e for e, t in zip(report["camera"]["eye"], report["camera"]["target"])]
+        self.assertAlmostEqual(way[0], 0, places=9)
+        self.assertAlmostEqual(way[1], 0, places=9)
+        self.assertLess(way[2], 0)
+        self.assertEqual(up, [0, 1, 0])
+
+    def test_the_window_follows_its_size(self):
+        report = self.view("wait\nresize 500 400\nwait 0.5\nwait\nwindow w.png\n")
+        self.assertEqual(read_png(self.folder / "w.png")[:2], (500, 400))
+        self.assertEqual(report["picture"]["width"], 500)
+        self.assertTrue(report["picture"]["complete"])
+
+    def test_a_model_is_converted_into_the_cache_once(self):
+        if not OPTIONS.has_pack:
+            self.skipTest("no converter in this build")
+        first = self.view("wait\n", files=[MODEL])
+        self.assertGreater(first["convert_seconds"], 0)
+        self.assertTrue(first["pack"].startswith(str(self.cache)))
+        second = self.view("wait\n", files=[MODEL])
+        self.assertEqual(second["convert_seconds"], 0)
+        self.assertEqual(second["pack"], first["pack"])
+        self.assertEqual([path.name for path in self.cache.rglob("*") if path.is_file()],
+                         [os.path.basename(first["pack"])])
+
+    def test_a_dropped_file_takes_the_place_of_the_first(self):
+        other = self.folder / "other.tray"
+        shutil.copy2(PACK, other)
+        report = self.view(f"wait\ndrop {other}\nwait 0.3\nwait\n")
+        self.assertEqual(report["file"], str(other))
+        self.assertEqual(report["files"], [str(other)])
+
+    def test_a_file_that_fails_is_told_and_what_is_there_stays(self):
+        broken = self.folder / "broken.tray"
+        broken.write_bytes(PACK.read_bytes()[:400])
+        report = self.view(f"wait\ndrop {broken}\nwait 0.3\nwait\nreport r.json\ndrop {PACK}\nwait 0.3\nwait\n")
+        told = json.loads((self.folder / "r.json").read_text())
+        self.assertEqual(told["file"], str(PACK))
+        self.assertIn("broken.tray", told["error"]["where"])
+        self.assertNotIn("error", report)
+        done = self.view("wait\n", files=[broken])
+        self.assertEqual(done.returncode, 3, done.stderr)
+
+    def test_a_conversion_that_is_given_up_leaves_nothing_behind(self):
+        if not OPTIONS.has_pack:
+            self.skipTest("no converter in this build")
+        big = self.folder / "big.step"
+        big.write_bytes((MODEL.parent / "NIST_MBE_PMI_11.stp").read_bytes())
+        report = self.view(f"wait\ndrop {big}\nwait 0.15\nclose\n")
+        self.assertEqual(report["file"], str(PACK))
+        time.sleep(0.5)
+        self.assertEqual([path for path in self.cache.rglob("*") if path.is_file()], [])
+
+    def test_what_is_recorded_plays_to_the_same_view(self):
+        first = self.view("wait\ndrag left 300 200 350 260\nscroll 0 2\nkey E\nwait\npicture a.png\n", "--record",
+                          "done.txt")
+        lines = (self.folder / "done.txt").read_text()
+        self.assertIn("press left", lines)
+        second = self.view(lines + "wait\npicture b.png\n")
+        self.assertEqual(second["camera"], first["camera"])
+        self.assertEqual((self.folder / "a.png").read_bytes(), (self.folder / "b.png").read_bytes())
+
+    def test_an_idle_window_leaves_the_processor_alone(self):
+        def processor_seconds(pause):
+            recording = self.folder / "idle.txt"
+            recording.write_text(f"wait\nwait {pause}\n")
+            before = os.times()
+            run("view", PACK, "--play", recording, "--size", "640x480", "--device", "cpu",
+                env=dict(os.environ, DISPLAY=self.display), timeout=120 * SLOW)
+            after = os.times()
+            return after.children_user + after.children_system - before.children_user - before.children_system
+
+        processor_seconds(0)  # warm
+        base = min(processor_seconds(0) for _ in range(3))
+        idle = min(processor_seconds(5) for _ in range(2)) - base
+        self.assertLess(idle / 5, 0.02)
+
+    def test_without_a_display_the_error_names_render(self):
+        environment = {name: value for name, value in os.environ.items() if name not in ("DISPLAY", "WAYLAND_DISPLAY")}
+        done = run("view", PACK, env=environment)
+        self.assertEqual(done.returncode, 4)
+        self.assertIn("trimray render", done.stderr)
+        self.assertEqual(len(done.stderr.splitlines()), 1)
+
+    def test_wrong_arguments_and_recordings_are_told(self):
+        self.assertEqual(run("view", "--navigation", "maya", PACK).returncode, 1)
+        recording = self.folder / "wrong.txt"
+        recording.write_text("wait\ndance\n")
+        done = run("view", PACK, "--play", recording)
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("wrong.txt:2", done.stderr)
+        self.assertEqual(run("view", PACK, "--play", self.folder / "none.txt").returncode, 2)
+        self.assertIn("Examples", self.ok("view", "--help").stdout)
