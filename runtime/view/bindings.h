@@ -43,7 +43,6 @@ enum class Action {
     ClearSelection,
     ToggleMeasure,
     // panels
-    ToggleTree,
     ToggleLook,
     ToggleStatus,
     ToggleTimes,

@@ -64,12 +64,6 @@ Picture selection_overlay(const Frame& frame, const PickedPoint& selected)
     return overlay;
 }
 
-/// "12.5" with so many digits as a length on the screen deserves.
-std::string length_text(double mm)
-{
-    return fmt::format("{:.6g}", mm);
-}
-
 } // namespace
 
 float Interface::em() const
@@ -82,15 +76,16 @@ void Interface::draw(Viewer& viewer, int width, int height)
     const ImGuiIO& io = ImGui::GetIO();
     const ViewerPanels& panels = viewer.panels;
     const int status = panels.status ? int(std::lround(ImGui::GetFrameHeight() + 4 * scale_)) : 0;
-    const int right = panels.look ? int(std::lround(std::min(22 * em(), 0.45f * float(width)))) : 0;
-    viewer.set_picture_rect({0, 0, width - right, height - status});
+    viewer.set_picture_rect({0, 0, width, height - status});
     draw_picture(viewer);
-    if (right > 0)
-        draw_look(viewer, width, height - status);
+    if (panels.look)
+        draw_look(viewer);
+    if (panels.measure)
+        draw_measure(viewer);
     if (status > 0)
         draw_status(viewer, width, height);
     draw_view_cube(viewer);
-    if (panels.times)
+    if (panels.times && !panels.look)
         draw_times(viewer);
     draw_toasts(viewer);
     draw_loading(viewer);
@@ -140,17 +135,22 @@ void Interface::draw_status(Viewer& viewer, int width, int height)
         if (viewer.files().size() > 1)
             line += fmt::format(" ({} of {})", viewer.file_index() + 1, viewer.files().size());
     }
-    std::optional<PickedPoint> point = viewer.hovered();
-    if (!point)
-        point = viewer.selection();
+    const std::optional<PickedPoint> point = viewer.hovered();
+    if (const std::optional<SurfaceFacts>& facts = viewer.measured().last; model && !point && facts) {
+        line += fmt::format(
+            "   {}{}face {} ({}{})   uv {:.9g} {:.9g}   at {:.9g}, {:.9g}, {:.9g} mm   normal {:.4f} {:.4f} {:.4f}",
+            facts->part_name, facts->part_name.empty() ? "" : ", ", facts->face, facts->kind_name,
+            facts->radius_mm ? ", radius " + length_text(*facts->radius_mm, unit_) : "", facts->uv_file[0],
+            facts->uv_file[1], facts->point_mm[0], facts->point_mm[1], facts->point_mm[2], facts->normal[0],
+            facts->normal[1], facts->normal[2]);
+    }
     if (model && point && point->face >= 0) {
         const PackImage& image = viewer.image();
         const FaceRecord& face = image.faces[size_t(point->face)];
         const std::string& part = image.strings.strings[image.parts[face.part].name];
-        line += fmt::format("   {}{}face {} ({})   uv {:.5g} {:.5g}   at {}, {}, {} mm", part, part.empty() ? "" : ", ",
-                            point->face, surface_kind_name(face.surface_kind), point->uv[0], point->uv[1],
-                            length_text(point->point_mm[0]), length_text(point->point_mm[1]),
-                            length_text(point->point_mm[2]));
+        line += fmt::format("   {}{}face {} ({})   uv {:.5g} {:.5g}   at {:.6g}, {:.6g}, {:.6g} mm", part,
+                            part.empty() ? "" : ", ", point->face, surface_kind_name(face.surface_kind), point->uv[0],
+                            point->uv[1], point->point_mm[0], point->point_mm[1], point->point_mm[2]);
     }
     text(line);
     const std::string keys = "H: keys";
@@ -360,13 +360,176 @@ void Interface::draw_view_cube(Viewer& viewer)
     ImGui::PopStyleVar();
 }
 
-void Interface::draw_look(Viewer& viewer, int width, int height)
+namespace {
+
+/// A choice among words; true: it was changed.
+template <class T, size_t N>
+bool choose(const char* label, T& value, const std::pair<T, const char*> (&choices)[N])
 {
-    const float wide = float(width - viewer.picture_rect().width);
-    ImGui::SetNextWindowPos({float(width) - wide, 0});
-    ImGui::SetNextWindowSize({wide, float(height)});
-    ImGui::Begin("look", nullptr, kPanel);
-    text("Drawing");
+    bool changed = false;
+    const auto now =
+        std::find_if(std::begin(choices), std::end(choices), [&](const auto& c) { return c.first == value; });
+    if (!ImGui::BeginCombo(label, now == std::end(choices) ? "?" : now->second))
+        return false;
+    for (const auto& [choice, name] : choices)
+        if (ImGui::Selectable(name, choice == value)) {
+            changed = choice != value;
+            value = choice;
+        }
+    ImGui::EndCombo();
+    return changed;
+}
+
+} // namespace
+
+void Interface::draw_look(Viewer& viewer)
+{
+    const PictureRect& rect = viewer.picture_rect();
+    ImGui::SetNextWindowPos({float(rect.x) + 10 * scale_, float(rect.y) + 10 * scale_});
+    ImGui::SetNextWindowBgAlpha(0.92f);
+    ImGui::Begin("look", nullptr, kPanel | ImGuiWindowFlags_AlwaysAutoResize);
+    ImGui::PushItemWidth(12 * em());
+    ViewState& state = viewer.state();
+    SceneRequest& look = state.look;
+    bool changed = false;
+    ImGui::TextDisabled("Drawing");
+    EdgeLines lines = look.edges.value_or(EdgeLines::None);
+    if (choose("lines", lines,
+               {{EdgeLines::None, "none"}, {EdgeLines::Sharp, "sharp edges"}, {EdgeLines::All, "all edges"}})) {
+        look.edges = lines;
+        changed = true;
+    }
+    changed |= ImGui::SliderFloat("line width", &look.edge_width_px, 0.5f, 8, "%.1f px");
+    bool outlines = look.silhouettes.value_or(false);
+    if (ImGui::Checkbox("outlines", &outlines)) {
+        look.silhouettes = outlines;
+        changed = true;
+    }
+    ShadowKind shadows = look.shadows.value_or(ShadowKind::None);
+    if (choose("shadows", shadows,
+               {{ShadowKind::None, "none"}, {ShadowKind::Hard, "hard"}, {ShadowKind::Soft, "soft"}})) {
+        look.shadows = shadows;
+        changed = true;
+    }
+    int occlusion = int(look.look.occlusion.samples);
+    if (ImGui::SliderInt("occlusion", &occlusion, 0, 64, "%d rays")) {
+        look.look.occlusion.samples = uint32_t(std::max(occlusion, 0));
+        changed = true;
+    }
+    bool through = look.look.xray.has_value();
+    float opacity = look.look.xray.value_or(0.35f);
+    const bool toggled = ImGui::Checkbox("see through", &through);
+    if (through)
+        ImGui::SameLine();
+    if ((through && ImGui::SliderFloat("##opacity", &opacity, 0, 1, "%.2f")) || toggled) {
+        look.look.xray = through ? std::optional(std::clamp(opacity, 0.0f, 1.0f)) : std::nullopt;
+        changed = true;
+    }
+    changed |= choose("map", look.look.map.map,
+                      {{SurfaceMap::None, "none"},
+                       {SurfaceMap::Zebra, "zebra"},
+                       {SurfaceMap::Isophotes, "isophotes"},
+                       {SurfaceMap::CurvatureGaussian, "Gaussian curvature"},
+                       {SurfaceMap::CurvatureMean, "mean curvature"},
+                       {SurfaceMap::CurvatureMax, "largest curvature"},
+                       {SurfaceMap::CurvatureMin, "smallest curvature"},
+                       {SurfaceMap::Draft, "draft"}});
+    if (viewer.model()) {
+        const PackImage& image = viewer.image();
+        bool cut = !look.look.section.planes.empty();
+        if (ImGui::Checkbox("section", &cut))
+            viewer.act(Action::ToggleSection);
+        if (!look.look.section.planes.empty()) {
+            SectionPlane& plane = look.look.section.planes.front();
+            const auto leading = [&plane] {
+                size_t axis = 0;
+                for (size_t i = 1; i < 3; ++i)
+                    if (std::abs(plane.normal[i]) > std::abs(plane.normal[axis]))
+                        axis = i;
+                return axis;
+            };
+            size_t axis = leading();
+            for (size_t i = 0; i < 3; ++i) {
+                ImGui::SameLine();
+                constexpr const char* kNames[] = {"x", "y", "z"};
+                if (ImGui::RadioButton(kNames[i], i == axis)) {
+                    plane.normal = {0, 0, 0};
+                    plane.normal[i] = -1;
+                    axis = i;
+                    changed = true;
+                }
+            }
+            ImGui::SameLine();
+            if (ImGui::Button("flip")) {
+                for (double& c : plane.normal)
+                    c = -c;
+                changed = true;
+            }
+            const double lo = image.bounds_lo_mm[axis], hi = image.bounds_hi_mm[axis];
+            changed |= ImGui::SliderScalar("at", ImGuiDataType_Double, &plane.point_mm[axis], &lo, &hi, "%.4g mm");
+            changed |= choose("caps", look.look.section.caps,
+                              {{CapStyle::None, "none"}, {CapStyle::Filled, "filled"}, {CapStyle::Hatched, "hatched"}});
+        }
+        if (image.instances.size() > 1) {
+            constexpr double kApart = 0, kFar = 3;
+            changed |= ImGui::SliderScalar("apart", ImGuiDataType_Double, &look.look.arrangement.explode, &kApart,
+                                           &kFar, "%.2f");
+            look.look.arrangement.explode = std::max(look.look.arrangement.explode, 0.0);
+        }
+    }
+    ImGui::Spacing();
+    ImGui::TextDisabled("Accuracy");
+    changed |= ImGui::SliderFloat("error", &state.error_px, 0.001f, 1, "%.3f px", ImGuiSliderFlags_Logarithmic);
+    state.error_px = std::clamp(state.error_px, 0.001f, 1.0f);
+    changed |= choose("trims", state.trim,
+                      {{TrimMode::Auto, "the fastest that is right"},
+                       {TrimMode::Exact, "exact"},
+                       {TrimMode::Hybrid, "hybrid"},
+                       {TrimMode::Sdf, "distance texture alone"},
+                       {TrimMode::Kd, "kd-tree"}});
+    changed |= choose("closest hit", state.closest,
+                      {{ClosestPolicy::Certified, "certified"}, {ClosestPolicy::Stochastic, "stochastic"}});
+    int samples = int(state.samples());
+    if (ImGui::SliderInt("samples", &samples, 1, 4, "%d x %d a pixel")) {
+        look.samples = uint32_t(std::clamp(samples, 1, 4));
+        changed = true;
+    }
+    if (changed)
+        viewer.changed(ImGui::IsMouseDown(ImGuiMouseButton_Left));
+    ImGui::PopItemWidth();
+    ImGui::End();
+}
+
+void Interface::draw_measure(Viewer& viewer)
+{
+    const PictureRect& rect = viewer.picture_rect();
+    ImGui::SetNextWindowPos({float(rect.x + rect.width) - 10 * scale_, float(rect.y) + 8 * em()}, 0, {1, 0});
+    ImGui::SetNextWindowBgAlpha(0.92f);
+    ImGui::Begin("measure", nullptr, kPanel | ImGuiWindowFlags_AlwaysAutoResize);
+    ImGui::PushItemWidth(7 * em());
+    choose("unit", unit_,
+           {{LengthUnit::Millimetre, "mm"},
+            {LengthUnit::Centimetre, "cm"},
+            {LengthUnit::Metre, "m"},
+            {LengthUnit::Inch, "inch"}});
+    ImGui::PopItemWidth();
+    const MeasuredPicks& picks = viewer.measured();
+    const auto list = [&](const char* heading, const std::vector<Dimension>& dimensions) {
+        if (dimensions.empty())
+            return;
+        ImGui::TextDisabled("%s", heading);
+        for (const Dimension& dimension : dimensions)
+            text(fmt::format("{}: {}", name_of(dimension.kind), to_text(dimension, unit_)));
+    };
+    if (!picks.last)
+        ImGui::TextDisabled("Click a face, then another.");
+    else {
+        list("this face", dimensions_of(*picks.last));
+        if (picks.edge)
+            list("its nearest edge", dimensions_of(picks.edge->facts));
+        if (picks.before)
+            list("from the face before", dimensions_between(*picks.before, *picks.last));
+    }
     ImGui::End();
 }
 

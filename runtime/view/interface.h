@@ -1,6 +1,7 @@
 // What is drawn around and over the picture: panels, status line, messages, the cube of views, the cheat sheet.
 #pragma once
 
+#include "runtime/view/dimensions.h"
 #include "runtime/view/gl_picture.h"
 #include "runtime/view/viewer.h"
 
@@ -27,12 +28,14 @@ private:
     void draw_cheat_sheet(Viewer& viewer, int width, int height);
     void draw_view_cube(Viewer& viewer);
     void draw_times(Viewer& viewer);
-    void draw_look(Viewer& viewer, int width, int height);
+    void draw_look(Viewer& viewer);
+    void draw_measure(Viewer& viewer);
     float em() const;
 
     float scale_;
     GlPicture picture_, selection_;
     uint64_t uploaded_ = 0, outlined_ = 0;
+    LengthUnit unit_ = LengthUnit::Millimetre;
     bool wants_pointer_ = false, wants_keys_ = false;
 };
 

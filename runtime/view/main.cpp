@@ -159,6 +159,22 @@ Json report_of(const Viewer& viewer)
     if (const std::optional<PickedPoint>& picked = viewer.selection())
         report["selection"] = {
             {"face", picked->face}, {"instance", picked->instance}, {"point", picked->point_mm}, {"uv", picked->uv}};
+    if (const std::optional<SurfaceFacts>& facts = viewer.measured().last) {
+        report["selection"]["kind"] = facts->kind_name;
+        if (facts->radius_mm)
+            report["selection"]["radius_mm"] = *facts->radius_mm;
+        Json& measures = report["measures"] = Json::array();
+        std::vector<Dimension> dimensions = dimensions_of(*facts);
+        const auto add = [&](const std::vector<Dimension>& more) {
+            dimensions.insert(dimensions.end(), more.begin(), more.end());
+        };
+        if (viewer.measured().edge)
+            add(dimensions_of(viewer.measured().edge->facts));
+        if (viewer.measured().before)
+            add(dimensions_between(*viewer.measured().before, *facts));
+        for (const Dimension& dimension : dimensions)
+            measures.push_back({{"name", name_of(dimension.kind)}, {"value", dimension.value}});
+    }
     Json toasts = Json::array();
     for (const Toast& toast : viewer.toasts())
         toasts.push_back(toast.text);

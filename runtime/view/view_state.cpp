@@ -56,10 +56,10 @@ SceneRequest scene_of(const ViewState& state)
     return scene;
 }
 
-Reach placement_reach(const PackImage& image, uint32_t instance)
+Reach placement_reach(const PackImage& image, const PlacementView& placed, uint32_t instance)
 {
-    return [&image, instance](const std::array<double, 3>& direction) {
-        return largest_along(image, image.instances[instance], direction);
+    return [&image, placed, instance](const std::array<double, 3>& direction) {
+        return largest_along(image, placed.instances[instance], direction);
     };
 }
 

@@ -4,6 +4,7 @@
 
 #include "runtime/camera.h"
 #include "runtime/navigation.h"
+#include "runtime/placement_view.h"
 #include "runtime/scene_request.h"
 #include "runtime/tracer.h"
 
@@ -38,7 +39,7 @@ SceneCamera scene_camera(const Camera& camera);
 /// What the state asks for, as a scene file: its camera is the file's only one.
 SceneRequest scene_of(const ViewState& state);
 
-/// Of one placement, world mm; the pack must outlive it.
-Reach placement_reach(const PackImage& image, uint32_t instance);
+/// Of one placement where it stands, world mm; the pack and what is placed must outlive it.
+Reach placement_reach(const PackImage& image, const PlacementView& placed, uint32_t instance);
 
 } // namespace trimray

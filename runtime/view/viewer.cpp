@@ -52,6 +52,11 @@ const char* view_of(Action action)
     }
 }
 
+reference::Vec3 to_vector(const std::array<double, 3>& v)
+{
+    return {v[0], v[1], v[2]};
+}
+
 /// The camera with its target, about which it turns, in the depth of the middle of what it shows.
 Camera turning_about_middle(Camera camera, const Reach& reach)
 {
@@ -121,6 +126,10 @@ void Viewer::take_model()
     hits_.reset();
     selection_.reset();
     ++shown_count_;
+    arrangement_ = {};
+    if (model_ && !keeps_view)
+        state_.look.look.arrangement = {}; // its names were the other model's
+    measured_ = {};
     model_ = std::move(**done);
     for (const std::string& note : model_->notes)
         tell(note);
@@ -128,9 +137,9 @@ void Viewer::take_model()
         SceneCamera asked = std::exchange(first_camera_, std::nullopt).value_or(SceneCamera{});
         if (!asked.eye && state_.camera.orthographic_mm > 0)
             asked.parallel = true;
-        const Result<Camera> camera = camera_of(asked, image(), size().width, size().height);
+        const Result<Camera> camera = camera_of(asked, placed(), visible_reach(), size().width, size().height);
         if (camera.ok())
-            state_.camera = asked.eye ? *camera : turning_about_middle(*camera, model_reach(image()));
+            state_.camera = asked.eye ? *camera : turning_about_middle(*camera, visible_reach());
         else
             tell(camera.error().detail, true);
     }
@@ -261,16 +270,28 @@ void Viewer::look_from(const std::string& view)
     const double aspect = double(rect_.width) / rect_.height;
     Camera camera = state_.camera;
     if (state_.camera.orthographic_mm > 0)
-        standard_orthographic_view(view, model_reach(image()), aspect, 0, camera);
+        standard_orthographic_view(view, visible_reach(), aspect, 0, camera);
     else
-        standard_view(view, model_reach(image()), aspect, camera.fov_deg, camera);
-    look_along(turning_about_middle(camera, model_reach(image())));
+        standard_view(view, visible_reach(), aspect, camera.fov_deg, camera);
+    look_along(turning_about_middle(camera, visible_reach()));
 }
 
 void Viewer::look_along(const Camera& camera)
 {
     state_.camera = camera;
     changed();
+}
+
+// Where the look at hand puts everything. What it cannot is told by the picture that is ordered.
+PlacementView Viewer::placed()
+{
+    (void)arrangement_.change_to(image(), state_.look.look.arrangement);
+    return arrangement_.view(image());
+}
+
+Reach Viewer::visible_reach()
+{
+    return model_reach(image(), placed());
 }
 
 void Viewer::frame(const Reach& reach)
@@ -307,6 +328,7 @@ std::optional<PickedPoint> Viewer::pick(double x, double y) const
     picked.instance = frame.instance[at];
     picked.uv = {frame.uv[2 * at], frame.uv[2 * at + 1]};
     picked.eye_mm = rays.eye;
+    picked.along = along;
     double distance = frame.depth_mm[at];
     if (rays.plane_mm > 0) // depth counts from the plane, along the middle of the view
         distance += rays.plane_mm / dot(along, camera_axes(hits_->traced.camera).forward);
@@ -331,6 +353,18 @@ void Viewer::select(std::optional<PickedPoint> picked)
 {
     selection_ = std::move(picked);
     ++shown_count_; // its overlay is another
+    measured_.before = std::exchange(measured_.last, std::nullopt);
+    measured_.edge.reset();
+    if (!selection_ || selection_->face < 0) {
+        measured_ = {};
+        return;
+    }
+    measured_.last =
+        surface_facts(image(), {uint32_t(selection_->face),
+                                uint32_t(selection_->instance),
+                                {selection_->uv[0], selection_->uv[1]},
+                                reference::Ray{to_vector(selection_->eye_mm), to_vector(selection_->along)}});
+    measured_.edge = picked_edge(image(), *measured_.last);
 }
 
 void Viewer::click(double x, double y)
@@ -467,9 +501,6 @@ void Viewer::act(Action action)
             begin_load();
         }
         return;
-    case Action::ToggleTree:
-        panels.tree = !panels.tree;
-        return;
     case Action::ToggleLook:
         panels.look = !panels.look;
         return;
@@ -497,11 +528,11 @@ void Viewer::act(Action action)
         return;
     switch (action) {
     case Action::Fit:
-        return frame(model_reach(image()));
+        return frame(visible_reach());
     case Action::FitSelection:
         if (!selection_ || selection_->instance < 0)
-            return frame(model_reach(image()));
-        return frame(placement_reach(image(), uint32_t(selection_->instance)));
+            return frame(visible_reach());
+        return frame(placement_reach(image(), placed(), uint32_t(selection_->instance)));
     case Action::ToggleParallel:
         return look_along(state_.camera.orthographic_mm > 0 ? with_perspective(state_.camera)
                                                             : with_parallel_rays(state_.camera));

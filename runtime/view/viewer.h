@@ -2,9 +2,12 @@
 // window's loop (main.cpp) gives it events and shows its pictures; the interface (interface.h) reads and changes it.
 #pragma once
 
+#include "runtime/arrangement.h"
 #include "runtime/view/bindings.h"
+#include "runtime/view/edge_measure.h"
 #include "runtime/view/model_loader.h"
 #include "runtime/view/picture_thread.h"
+#include "runtime/view/surface_facts.h"
 #include "runtime/view/view_state.h"
 
 #include <array>
@@ -27,11 +30,17 @@ struct PickedPoint {
     int32_t face = -1, instance = -1; // face -1: a cap of a section
     std::array<double, 3> point_mm{};
     std::array<double, 2> uv{};
-    std::array<double, 3> eye_mm{}; // whence it is seen
+    std::array<double, 3> eye_mm{}, along{}; // whence and along what it is seen
 };
 
 struct ViewerPanels {
-    bool tree = false, look = false, status = true, times = false, cheat_sheet = false, measure = false;
+    bool look = false, status = true, times = false, cheat_sheet = false, measure = false;
+};
+
+/// What was picked last and before that, measured on the surfaces themselves, and the edge nearest to the last.
+struct MeasuredPicks {
+    std::optional<SurfaceFacts> last, before;
+    std::optional<PickedEdge> edge;
 };
 
 /// A message for a while, in the picture's corner.
@@ -98,6 +107,7 @@ public:
     std::optional<PickedPoint> pick(double x, double y) const;
     const std::optional<PickedPoint>& selection() const { return selection_; }
     std::optional<PickedPoint> hovered() const;
+    const MeasuredPicks& measured() const { return measured_; }
     const std::vector<Toast>& toasts() const { return toasts_; }
     /// Nothing is being loaded, traced or saved, and nothing moves.
     bool at_rest() const;
@@ -118,6 +128,8 @@ private:
     void click(double x, double y);
     void recenter(double x, double y);
     void frame(const Reach& reach);
+    PlacementView placed();
+    Reach visible_reach();
     std::array<double, 2> in_picture(double x, double y) const { return {x - rect_.x, y - rect_.y}; }
     PictureSize size() const { return {uint32_t(rect_.width), uint32_t(rect_.height)}; }
 
@@ -132,6 +144,7 @@ private:
     bool keeps_view_ = false; // the file that is being loaded is the one that is there, read again
     std::optional<Error> failure_;
     std::optional<LoadedModel> model_;
+    KeptArrangement arrangement_; // of the model's placements, as the look says
 
     PictureRect rect_;
     bool dirty_ = false, moving_ = false;
@@ -147,6 +160,7 @@ private:
     Clock::time_point last_click_{};
     std::array<double, 3> zoom_point_{};
     std::optional<PickedPoint> selection_;
+    MeasuredPicks measured_;
     std::vector<Toast> toasts_;
     struct PendingPicture {
         std::string file;
