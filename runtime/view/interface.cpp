@@ -490,7 +490,7 @@ void Interface::draw_look(Viewer& viewer)
     changed |= choose("closest hit", state.closest,
                       {{ClosestPolicy::Certified, "certified"}, {ClosestPolicy::Stochastic, "stochastic"}});
     int samples = int(state.samples());
-    if (ImGui::SliderInt("samples", &samples, 1, 4, "%d x %d a pixel")) {
+    if (ImGui::SliderInt("samples", &samples, 1, 4, fmt::format("{0} x {0} a pixel", samples).c_str())) {
         look.samples = uint32_t(std::clamp(samples, 1, 4));
         changed = true;
     }

@@ -267,7 +267,7 @@ private:
         const uint64_t count = viewer_.shown_count();
         viewer_.update(now);
         // the interface settles a frame after what it is told; then nothing moves until something happens
-        if (!events.empty() || viewer_.shown_count() != count || viewer_.loader().busy())
+        if (!events.empty() || viewer_.shown_count() != count)
             redraws_ = 2;
         else if (redraws_ > 0)
             --redraws_;

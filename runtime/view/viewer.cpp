@@ -110,6 +110,8 @@ void Viewer::cancel_load()
 
 void Viewer::take_model()
 {
+    if (!has_rect_)
+        return; // the first view is framed for the window as it is
     std::optional<Result<LoadedModel>> done = loader_.take();
     if (!done)
         return;
@@ -152,6 +154,7 @@ void Viewer::set_picture_rect(const PictureRect& rect)
 {
     const bool same_size = rect.width == rect_.width && rect.height == rect_.height;
     rect_ = {rect.x, rect.y, std::max(rect.width, 1), std::max(rect.height, 1)};
+    has_rect_ = true;
     if (!same_size)
         changed(true); // a window's border being dragged is a move
 }
@@ -219,7 +222,7 @@ double Viewer::patience(Clock::time_point now) const
 
 bool Viewer::at_rest() const
 {
-    if (loader_.busy() || moving_ || dirty_ || !pending_.empty())
+    if (!has_rect_ || loader_.busy() || moving_ || dirty_ || !pending_.empty())
         return false;
     return !model_ || (shown_ && shown_->complete && shown_->order == ordered_);
 }
@@ -370,8 +373,10 @@ void Viewer::select(std::optional<PickedPoint> picked)
 void Viewer::click(double x, double y)
 {
     const auto now = Clock::now();
-    const bool is_double = now - last_click_ < kDoubleClick;
+    const bool is_double = now - last_click_ < kDoubleClick && std::hypot(x - click_x_, y - click_y_) <= kClickPixels;
     last_click_ = is_double ? Clock::time_point{} : now;
+    click_x_ = x;
+    click_y_ = y;
     if (is_double)
         recenter(x, y);
     else

@@ -147,13 +147,14 @@ private:
     KeptArrangement arrangement_; // of the model's placements, as the look says
 
     PictureRect rect_;
+    bool has_rect_ = false;
     bool dirty_ = false, moving_ = false;
     Clock::time_point still_at_{}; // when a moving view counts as resting
     uint64_t ordered_ = 0;
     std::optional<ShownPicture> shown_, hits_;
     uint64_t shown_count_ = 0;
 
-    double pointer_x_ = -1, pointer_y_ = -1, press_x_ = 0, press_y_ = 0;
+    double pointer_x_ = -1, pointer_y_ = -1, press_x_ = 0, press_y_ = 0, click_x_ = 0, click_y_ = 0;
     unsigned buttons_ = 0;
     int drag_mods_ = 0;
     bool dragged_ = false;
