@@ -344,11 +344,22 @@ std::optional<PickedPoint> Viewer::hovered() const
     return buttons_ == 0 ? pick(pointer_x_, pointer_y_) : std::nullopt;
 }
 
+// On the surface that is seen there now, though the picture may lag behind; else as far away as the target.
 std::array<double, 3> Viewer::point_under(double x, double y) const
 {
-    if (const std::optional<PickedPoint> picked = pick(x, y))
-        return picked->point_mm;
     const auto [px, py] = in_picture(x, y);
+    if (state_.look.look.arrangement.any() || !state_.look.look.section.planes.empty()) { // one ray meets all there is
+        if (const std::optional<PickedPoint> picked = pick(x, y))
+            return picked->point_mm;
+    } else {
+        using namespace camera_math;
+        const CameraRays rays = camera_rays(state_.camera, size().width, size().height);
+        const Vec3 along = normalised(rays.corner + rays.step_x * px + rays.step_y * py, {0, 0, -1});
+        const double from = rays.plane_mm > 0 ? rays.plane_mm / dot(along, camera_axes(state_.camera).forward) : 0;
+        const Vec3 start = rays.eye + along * from;
+        if (const RayHit hit = trace_ray(*model_->scene, start, along); hit.hit)
+            return start + along * hit.distance_mm;
+    }
     return point_at_target(state_.camera, px, py, size());
 }
 
