@@ -43,6 +43,14 @@ def check_desktop(prefix, pack, folder, environment):
     value = section[start + 2:start + 2 + int.from_bytes(section[start:start + 2], "big")]
     expect(len(value) == 12 and pack.read_bytes().startswith(value), f"a pack begins as the type says: {value}")
 
+    application = configparser.ConfigParser(interpolation=None)
+    application.optionxform = str
+    application.read(share / "applications" / "trimray.desktop")
+    words = shlex.split(application["Desktop Entry"]["Exec"])
+    expect(words == ["trimray", "view", "%F"], "files are opened by the viewer")
+    expect("model/x-trimray" in application["Desktop Entry"]["MimeType"].split(";"), "the viewer opens packs")
+    run(prefix / "bin" / words[0], words[1], "--help", env=environment)
+
     entry = configparser.ConfigParser(interpolation=None)
     entry.read(share / "thumbnailers" / "trimray.thumbnailer")
     entry = entry["Thumbnailer Entry"]

@@ -2,9 +2,9 @@
 
 #include "runtime/bench_view.h"
 #include "runtime/closest_errors.h"
+#include "runtime/command_converter.h"
 #include "runtime/command_json.h"
 #include "runtime/derived_scene.h"
-#include "runtime/command_converter.h"
 #include "runtime/measure/mesh_tracer.h"
 #include "runtime/measure/one_ray_tracer.h"
 #include "runtime/measure/turns.h"
