@@ -1,6 +1,6 @@
 import json
 
-from case import PACK, TESTS, WORK, CliTest, run
+from case import MODEL, OPTIONS, PACK, TESTS, WORK, CliTest, run
 from pictures import alphas, read_png
 
 
@@ -185,3 +185,31 @@ class Scene(CliTest):
         self.assertEqual(list(WORK.glob("wrong*.png")), [], "a fault in one camera is found before the first picture")
         for pattern in ["a%s.png", "a%d%d.png", "a%.png", "a%03.png"]:
             self.fails(1, "render", PACK, "-o", WORK / pattern, *self.SMALL, "--turntable", 2, says=["-o", "%0Nd"])
+
+    def test_parts_are_hidden_alone_or_moved_apart(self):
+        if not OPTIONS.has_pack:
+            self.skipTest("no converter in this build")
+        pack = WORK / "two.tray"
+        self.ok("pack", MODEL.parent / "red_cube_blue_cylinder.step", "-o", pack)
+
+        def picture(*options):
+            done = self.ok("render", pack, "-o", WORK / "two.png", "--size", "96x72", "--device", "cpu", *options)
+            return (WORK / "two.png").read_bytes(), done.stderr
+
+        whole, _ = picture()
+        one, _ = picture("--hide", "#1")
+        other, _ = picture("--hide", "#0")
+        self.assertEqual(len({whole, one, other}), 3)
+        self.assertEqual(picture("--only", "#0")[0], one)
+        self.assertEqual(picture("--hide", "@1")[0], one)
+        self.assertNotEqual(picture("--explode", "1")[0], whole)
+        self.assertEqual(picture("--explode", "0")[0], whole)
+        same, told = picture("--hide", "no such part")
+        self.assertEqual(same, whole)
+        self.assertIn("no such part", told)
+        scene = WORK / "placements.json"
+        scene.write_text('{"placements": {"hide": ["#1"]}}')
+        self.assertEqual(picture("--scene", scene)[0], one)
+        for wrong, code in [(("--hide", "#9"), 3), (("--explode=-1",), 1)]:
+            self.assertEqual(run("render", pack, "-o", WORK / "no.png", *wrong).returncode, code, wrong)
+        self.assertFalse((WORK / "no.png").exists())
