@@ -135,6 +135,17 @@ Result<Ran> run_watched(const std::string& program, std::vector<std::string> arg
     return ran;
 }
 
+/// What trimray-pack said of a model, without its own name, the model's and the error's number.
+std::string reason(std::string words, const std::string& model)
+{
+    const std::string before = "trimray-pack: " + model + ": ";
+    if (words.starts_with(before))
+        words.erase(0, before.size());
+    if (const size_t number = words.rfind(" [E"); number != std::string::npos && words.ends_with("]"))
+        words.erase(number);
+    return words.empty() ? "no reason given" : words;
+}
+
 ErrorCode code_of(int exit_code)
 {
     switch (exit_code) {
@@ -197,8 +208,7 @@ Result<Json> run_converter(const std::string& model, const std::string& output, 
         return ran.error();
     }
     if (ran->exit_code != kExitOk && ran->exit_code != kExitPartial)
-        return Error{code_of(ran->exit_code), model,
-                     "was not converted: " + (ran->last_words.empty() ? "no reason given" : ran->last_words)};
+        return Error{code_of(ran->exit_code), model, "was not converted: " + reason(ran->last_words, model)};
     Json report = Json::parse(ran->output, nullptr, false);
     if (report.is_discarded())
         return Error{ErrorCode::Internal, *program, "its report is no JSON"};

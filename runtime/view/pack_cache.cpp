@@ -41,6 +41,9 @@ Result<std::string> pack_cache_folder()
 
 Result<std::string> cached_pack_name(const std::string& cad_file)
 {
+    std::error_code unknown; // opening it says so then
+    if (fs::is_directory(cad_file, unknown))
+        return Error{ErrorCode::FileNotReadable, cad_file, "is a folder; name the files in it"};
     const Result<std::string> folder = pack_cache_folder();
     if (!folder.ok())
         return folder.error();

@@ -199,7 +199,7 @@ class Bench(CliTest):
             if OPTIONS.has_pack:
                 broken = Path(root) / "broken.step"
                 broken.write_text("ISO-10303-21;\nHEADER;\n")
-                self.fails(3, "bench", "accuracy", broken, "-o", root, says=["broken.step", "was not converted: trimray-pack"])
+                self.fails(3, "bench", "accuracy", broken, "-o", root, says=["broken.step", "was not converted: "])
 
     def test_accuracy_refuses_what_it_cannot_do(self):
         with tempfile.TemporaryDirectory() as root:

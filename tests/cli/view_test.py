@@ -140,8 +140,13 @@ class View(CliTest):
         self.assertEqual(told["file"], str(PACK))
         self.assertIn("broken.tray", told["error"]["where"])
         self.assertNotIn("error", report)
-        done = self.view("wait\n", files=[broken])
-        self.assertEqual(done.returncode, 3, done.stderr)
+        empty = self.folder / "empty.step"
+        empty.write_bytes(b"")
+        for file, code, words in [(broken, 3, "finding"), (self.folder, 2, "is a folder"), ("none.tray", 2, "none.tray"),
+                                  (empty, 3 if OPTIONS.has_pack else 4, "empty")]:
+            done = self.view("wait\n", files=[file])
+            self.assertEqual(done.returncode, code, done.stderr)
+            self.assertIn(words, done.stderr)
 
     def test_a_conversion_that_is_given_up_leaves_nothing_behind(self):
         if not OPTIONS.has_pack:
