@@ -16,6 +16,7 @@
 
 #include <chrono>
 #include <cstdio>
+#include <ctime>
 #include <exception>
 #include <filesystem>
 #include <memory>
@@ -238,6 +239,7 @@ public:
                 report["seconds"][name] = *seconds;
         report["presented_by"] = window_.driver();
         report["frames"] = frames_;
+        report["cpu_seconds"] = double(std::clock()) / CLOCKS_PER_SEC; // of all threads
         return report;
     }
 
