@@ -407,8 +407,9 @@ int run(int argc, char** argv)
         fmt::print("{}\n", loop.report().dump());
     if (!ran.ok())
         return report_error(ran.error(), kProgram);
-    if (viewer.failure() && !options.play.empty())
-        return report_error(*viewer.failure(), kProgram);
+    for (const std::optional<Error>& failure : {viewer.failure(), viewer.save_failure()})
+        if (failure && !options.play.empty())
+            return report_error(*failure, kProgram);
     return kExitOk;
 }
 

@@ -25,8 +25,8 @@ std::string phase_text(const std::string& phase)
 {
     static const std::pair<const char*, const char*> kWords[] = {
         {"read", "reading"},          {"transfer", "translating"}, {"faces", "taking over faces"},
-        {"mesh", "making a preview"}, {"convert", "converting"},   {"trims", "making trims"},
-        {"bvh", "building trees"},    {"write", "writing"},
+        {"mesh", "making triangles"}, {"convert", "converting"},   {"previews", "making previews"},
+        {"write", "writing"},
     };
     for (const auto& [word, text] : kWords)
         if (phase == word)
@@ -57,7 +57,6 @@ void ModelLoader::start(const std::string& file)
             const std::lock_guard lock(mutex_);
             if (!cancelled_)
                 done_ = std::move(loaded);
-            busy_ = false;
         }
         wake_();
     });
@@ -82,6 +81,8 @@ LoadProgress ModelLoader::progress() const
 std::optional<Result<LoadedModel>> ModelLoader::take()
 {
     const std::lock_guard lock(mutex_);
+    if (done_)
+        busy_ = false;
     return std::exchange(done_, std::nullopt);
 }
 

@@ -47,6 +47,7 @@ public:
     /// Ends what is going on: a conversion leaves nothing behind. Waits for that.
     void cancel();
 
+    /// Until what was started is taken or cancelled.
     bool busy() const { return busy_; }
     LoadProgress progress() const;
     /// The model, or why there is none; once. Nothing after a cancel.

@@ -167,10 +167,8 @@ bool PictureThread::trace(const PictureOrder& order, uint64_t number, double sha
     else if (!shown.complete)
         frame->rgba.clear();
     shown.ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
-    if (samples == 1 && (order.moving || share < 1))
+    if (samples == 1 && share == share_)
         share_ = next_share(share, shown.ms, kMovingMs);
-    else if (samples == 1 && share_ == 1 && shown.ms > kMovingMs)
-        share_ = next_share(1, shown.ms, kMovingMs);
     shown.frame = std::move(*frame);
     options.cancelled = nullptr;
     shown.order = number;

@@ -5,6 +5,7 @@
 #include "runtime/command_trace.h"
 #include "runtime/image_io.h"
 #include "runtime/scene_write.h"
+#include "runtime/trim_mode.h"
 
 #include <fmt/format.h>
 
@@ -171,17 +172,28 @@ void Viewer::changed(bool moving)
 void Viewer::order(bool moving)
 {
     const Result<RenderOptions> options = options_of(state_, size(), image());
+    picture_failure_.reset();
     if (!options.ok()) {
-        tell(options.error().detail, true);
+        fail_picture(options.error());
         return;
     }
     ordered_ = pictures_.order({model_->tracer, *options, state_.samples(), moving});
 }
 
+// No picture will come of what is asked for: nobody is to wait for it.
+void Viewer::fail_picture(const Error& error)
+{
+    tell(error.where.empty() ? error.detail : fmt::format("{}: {}", error.where, error.detail), true);
+    picture_failure_ = error;
+    if (!pending_.empty() && !save_failure_)
+        save_failure_ = error;
+    pending_.clear();
+}
+
 void Viewer::take_picture()
 {
-    if (std::optional<Error> error = pictures_.take_error())
-        tell(error->detail, true);
+    if (const std::optional<Error> error = pictures_.take_error())
+        fail_picture(*error);
     std::optional<ShownPicture> picture = pictures_.take();
     if (!picture)
         return;
@@ -224,13 +236,30 @@ bool Viewer::at_rest() const
 {
     if (!has_rect_ || loader_.busy() || moving_ || dirty_ || !pending_.empty())
         return false;
-    return !model_ || (shown_ && shown_->complete && shown_->order == ordered_);
+    return !model_ || picture_failure_ || (shown_ && shown_->complete && shown_->order == ordered_);
 }
 
 void Viewer::save_picture(const std::string& file, bool transparent)
 {
-    if (model_)
+    if (model_ && !picture_failure_)
         pending_.push_back({file, transparent});
+    else if (!save_failure_)
+        save_failure_ = picture_failure_
+                            ? *picture_failure_
+                            : Error{ErrorCode::ImageNotWritten, file, "there is no picture: no model is open"};
+}
+
+// The options of render that a scene file has no keys for, where they are not the defaults.
+std::string Viewer::accuracy_options() const
+{
+    std::string options;
+    if (state_.trim != TrimMode::Auto)
+        options += fmt::format(" --trim {}", trim_name(state_.trim));
+    if (state_.closest != ClosestPolicy::Certified)
+        options += fmt::format(" --closest {}", closest_name(state_.closest));
+    if (state_.error_px != RenderOptions{}.error_px)
+        options += fmt::format(" --error-px {}", state_.error_px);
+    return options;
 }
 
 void Viewer::write_pending()
@@ -242,8 +271,8 @@ void Viewer::write_pending()
         state.has_background = state.has_background && !picture.transparent;
         const Result<std::vector<std::byte>> png =
             encode_png(state.has_background ? shown_->colours : shown_->transparent());
-        const std::string text = scene_text(scene_of(state)) + "\n";
         const std::string sidecar = fs::path(picture.file).replace_extension(".json").string();
+        const std::string text = scene_text(scene_of(state), sidecar) + "\n";
         Status written = png.ok() ? write_file_atomically(picture.file, *png) : Status(png.error());
         if (written.ok()) {
             const auto bytes = std::as_bytes(std::span(text));
@@ -251,10 +280,13 @@ void Viewer::write_pending()
         }
         if (!written.ok()) {
             tell(fmt::format("{}: {}", written.error().where, written.error().detail), true);
+            if (!save_failure_)
+                save_failure_ = written.error();
             continue;
         }
-        tell(fmt::format("saved {}; the same again: trimray render {} --scene {} --size {}x{} -o FILE.png",
-                         picture.file, model_->pack, sidecar, shown_->full_width, shown_->full_height));
+        tell(fmt::format("saved {}; the same again: trimray render {} --scene {} --size {}x{}{} -o FILE.png",
+                         picture.file, model_->pack, sidecar, shown_->full_width, shown_->full_height,
+                         accuracy_options()));
     }
 }
 

@@ -97,6 +97,8 @@ public:
     size_t file_index() const { return file_index_; }
     const ModelLoader& loader() const { return loader_; }
     const std::optional<Error>& failure() const { return failure_; } // of the file that is to be seen
+    /// Why the first picture that could not be saved was not.
+    const std::optional<Error>& save_failure() const { return save_failure_; }
     const PictureRect& picture_rect() const { return rect_; }
     const ShownPicture* shown() const { return shown_ ? &*shown_ : nullptr; }
     /// Counts up with each picture that is taken.
@@ -121,6 +123,8 @@ private:
     void take_model();
     void take_picture();
     void order(bool moving);
+    void fail_picture(const Error& error);
+    std::string accuracy_options() const;
     void write_pending();
     void drag_to(double x, double y);
     void zoom_at(double x, double y, double scale);
@@ -168,6 +172,8 @@ private:
         bool transparent;
     };
     std::vector<PendingPicture> pending_;
+    std::optional<Error> picture_failure_; // of what is ordered
+    std::optional<Error> save_failure_;
     bool quits_ = false;
 
     ModelLoader loader_;

@@ -150,6 +150,21 @@ class View(CliTest):
             self.assertEqual(done.returncode, code, done.stderr)
             self.assertIn(words, done.stderr)
 
+    def test_a_picture_that_cannot_be_is_told_and_not_waited_for(self):
+        done = self.view("wait\npicture p.png\nwait\n", "--hide", "#99")
+        self.assertEqual(done.returncode, 3, done.stderr)
+        self.assertIn("#99", done.stderr)
+        self.assertFalse((self.folder / "p.png").exists())
+        done = self.view("wait\npicture none/p.png\nwait\n")
+        self.assertEqual(done.returncode, 2, done.stderr)
+        self.assertIn("none", done.stderr)
+
+    def test_what_a_scene_file_has_no_key_for_is_in_the_command_told(self):
+        report = self.view("wait\npicture p.png\nwait\n", "--trim", "kd", "--error-px", "0.25")
+        told = [message for message in report["messages"] if message.startswith("saved p.png")]
+        self.assertIn("--trim kd", told[0])
+        self.assertIn("--error-px 0.25", told[0])
+
     def test_a_conversion_that_is_given_up_leaves_nothing_behind(self):
         if not OPTIONS.has_pack:
             self.skipTest("no converter in this build")
