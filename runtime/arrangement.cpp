@@ -9,7 +9,9 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <string_view>
 #include <tuple>
+#include <unordered_map>
 #include <utility>
 
 namespace trimray {
@@ -26,40 +28,64 @@ std::optional<uint32_t> number_in(const std::string& name, size_t count)
     return number;
 }
 
-/// Sets `meant` for the placements that a name means. Returns whether there is any. Fails: InvalidScene.
-Result<bool> mark(const PackImage& image, const std::string& name, std::vector<uint8_t>& meant)
+/// What a number after # or @ means, where it is one of the pack's.
+struct Numbered {
+    std::optional<uint32_t> part, placement;
+    bool any() const { return part || placement; }
+};
+Numbered numbered(const PackImage& image, const std::string& name)
 {
-    const bool by_part = name.starts_with('#'), by_placement = name.starts_with('@');
-    const std::optional<uint32_t> part = by_part ? number_in(name, image.parts.size()) : std::nullopt;
-    const std::optional<uint32_t> placement = by_placement ? number_in(name, image.instances.size()) : std::nullopt;
-    bool any = part.has_value();
-    for (uint32_t i = 0; i < image.instances.size(); ++i) {
-        const InstanceRecord& instance = image.instances[i];
-        if (part == instance.part || placement == i || name == string_at(image, instance.name) ||
-            name == string_at(image, image.parts[instance.part].name))
-            meant[i] = any = true;
-    }
-    if (!any && by_part)
-        return Error{ErrorCode::InvalidScene, "placements",
-                     fmt::format("'{}': after # the number of a part is expected, below {}", name, image.parts.size())};
-    if (!any && by_placement)
-        return Error{
-            ErrorCode::InvalidScene, "placements",
-            fmt::format("'{}': after @ the number of a placement is expected, below {}", name, image.instances.size())};
-    return any;
+    Numbered out;
+    if (name.starts_with('#'))
+        out.part = number_in(name, image.parts.size());
+    if (name.starts_with('@'))
+        out.placement = number_in(name, image.instances.size());
+    return out;
 }
 
-/// What `names` mean, 1 each. Adds those that mean nothing to `unmatched`. Fails: InvalidScene.
+Error no_such_number(const PackImage& image, const std::string& name)
+{
+    const bool part = name.starts_with('#');
+    return {ErrorCode::InvalidScene, "placements",
+            fmt::format("'{}': after {} the number of a {} is expected, below {}", name, name.front(),
+                        part ? "part" : "placement", part ? image.parts.size() : image.instances.size())};
+}
+
+/// What `names` mean, 1 each. Adds those that mean nothing to `unmatched`. One walk over the placements, however many
+/// names there are. Fails: InvalidScene.
 Result<std::vector<uint8_t>> meant_by(const PackImage& image, const std::vector<std::string>& names,
                                       std::vector<std::string>& unmatched)
 {
-    std::vector<uint8_t> meant(image.instances.size());
+    std::vector<uint8_t> meant(image.instances.size()), parts(image.parts.size());
+    if (names.empty())
+        return meant;
+    std::unordered_map<std::string_view, bool> met; // by name: whether something has it
     for (const std::string& name : names) {
-        const Result<bool> any = mark(image, name, meant);
-        if (!any.ok())
-            return any.error();
-        if (!*any)
-            unmatched.push_back(name);
+        met.emplace(name, false);
+        const Numbered number = numbered(image, name);
+        if (number.part)
+            parts[*number.part] = 1;
+        if (number.placement)
+            meant[*number.placement] = 1;
+    }
+    const auto meets = [&](uint text) {
+        const auto found = met.find(string_at(image, text));
+        if (found != met.end())
+            found->second = true;
+        return found != met.end();
+    };
+    for (size_t i = 0; i < image.instances.size(); ++i) {
+        const InstanceRecord& instance = image.instances[i];
+        const bool own = meets(instance.name), of_part = meets(image.parts[instance.part].name);
+        if (own || of_part || parts[instance.part] != 0)
+            meant[i] = 1;
+    }
+    for (const std::string& name : names) {
+        if (met[name] || numbered(image, name).any())
+            continue;
+        if (name.starts_with('#') || name.starts_with('@'))
+            return no_such_number(image, name);
+        unmatched.push_back(name);
     }
     return meant;
 }

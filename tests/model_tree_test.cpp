@@ -2,6 +2,7 @@
 #include "runtime/view/model_tree.h"
 
 #include "format/pack_reader.h"
+#include "tests/model_trees.h"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -12,58 +13,6 @@ namespace {
 
 using testing::ElementsAre;
 using testing::IsEmpty;
-
-uint add_part(PackImage& image, const std::string& name, uint faces)
-{
-    PartRecord part{};
-    part.name = image.strings.add(name);
-    part.first_face = uint(image.faces.size());
-    part.face_count = faces;
-    for (uint i = 0; i < faces; ++i) {
-        FaceRecord face{};
-        face.part = uint(image.parts.size());
-        image.faces.push_back(face);
-    }
-    image.parts.push_back(part);
-    return uint(image.parts.size() - 1);
-}
-
-uint add_node(PackImage& image, uint parent, const std::string& name, uint rgba = 0)
-{
-    image.tree.push_back({parent, image.strings.add(name), rgba, 0});
-    return uint(image.tree.size() - 1);
-}
-
-uint place(PackImage& image, uint part, uint node, const std::string& name = "")
-{
-    InstanceRecord instance{};
-    instance.part = part;
-    instance.tree_node = node;
-    instance.name = image.strings.add(name);
-    image.instances.push_back(instance);
-    return uint(image.instances.size() - 1);
-}
-
-/// car -> (wheels -> (wheel, unnamed), unnamed with two placements, body)
-struct Car {
-    PackImage image;
-    Car()
-    {
-        const uint rim = add_part(image, "Rim", 3), hidden = add_part(image, "", 5), bolt = add_part(image, "BÖLT", 1);
-        add_node(image, 0, "car");
-        const uint wheels = add_node(image, 0, "Wheels", 0xff0000ffu);
-        const uint pair = add_node(image, 0, "");
-        const uint body = add_node(image, 0, "Кузов", 0x0000ff00u); // alpha 0: no colour
-        const uint wheel = add_node(image, wheels, "wheel 1");
-        const uint unnamed = add_node(image, wheels, "");
-        place(image, rim, wheel, "left");
-        place(image, hidden, pair);
-        place(image, bolt, pair, "screw");
-        place(image, hidden, unnamed);
-        place(image, rim, body);
-        place(image, rim, wheel);
-    }
-};
 
 TEST(model_tree, nodes_have_labels_colours_children_and_placements)
 {
@@ -110,21 +59,27 @@ TEST(model_tree, finds_the_node_of_a_placement_and_the_way_to_it)
     EXPECT_EQ(tree.nodes()[5].depth, 2u);
 }
 
-TEST(model_tree, lists_the_faces_of_a_part)
+TEST(model_tree, names_and_colours_of_faces_and_placements)
 {
     Car car;
     car.image.faces[3].name = car.image.strings.add("Lid");
     car.image.faces[4].surface_kind = kKindTorus;
     car.image.faces[4].flags = kFaceHasColor;
     car.image.faces[4].color_rgba = 0xff112233u;
+    car.image.faces[8].flags = kFaceHasColor; // the bolt's only one
+    car.image.faces[8].color_rgba = 0xff445566u;
+    car.image.instances[1].color_rgba = 0xff778899u;
     const ModelTree tree(car.image);
-    const std::vector<FaceEntry> faces = tree.faces_of_part(1);
-    ASSERT_EQ(faces.size(), 5u);
-    EXPECT_EQ(faces[0].face, 3u);
-    EXPECT_EQ(faces[0].label, "Lid");
-    EXPECT_EQ(faces[0].color_rgba, std::nullopt);
-    EXPECT_EQ(faces[1].label, "Face 4 (torus)");
-    EXPECT_EQ(faces[1].color_rgba, 0xff112233u);
+    EXPECT_EQ(tree.face_label(3), "Lid");
+    EXPECT_EQ(tree.face_color(3), std::nullopt);
+    EXPECT_EQ(tree.face_label(4), "Face 4 (torus)");
+    EXPECT_EQ(tree.face_color(4), 0xff112233u);
+    for (uint i = 0; i < car.image.instances.size(); ++i) {
+        const uint part = car.image.instances[i].part;
+        EXPECT_EQ(tree.placement_color(i), part == 2 ? std::optional(0xff445566u) // one has a colour, and all have it
+                                           : i == 1  ? std::optional(0xff778899u) // of five faces one has a colour
+                                                     : std::nullopt);
+    }
 }
 
 TEST(model_tree, search_finds_nodes_placements_and_parts_in_either_case)

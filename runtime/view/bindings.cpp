@@ -38,8 +38,11 @@ constexpr NamedAction kActions[] = {
     {Action::ShowAll, {"Parts", "show all parts"}},
     {Action::ClearSelection, {"Parts", "select nothing"}},
     {Action::ToggleMeasure, {"Parts", "measure"}},
+    {Action::Search, {"Parts", "search by name"}},
+    {Action::ToggleTree, {"Panels", "tree of parts"}},
     {Action::ToggleLook, {"Panels", "drawing and accuracy"}},
     {Action::ToggleStatus, {"Panels", "status line and file name"}},
+    {Action::ToggleMenu, {"Panels", "menu"}},
     {Action::ToggleTimes, {"Panels", "times of a picture"}},
     {Action::ToggleCheatSheet, {"Panels", "this sheet"}},
     {Action::PreviousFile, {"Files", "previous file"}},
@@ -75,6 +78,9 @@ std::vector<KeyBinding> common_keys()
         bind("Shift+I", Action::ShowAll),
         bind("Backspace", Action::ClearSelection),
         bind("M", Action::ToggleMeasure),
+        bind("Ctrl+F", Action::Search),
+        bind("T", Action::ToggleTree),
+        bind("F10", Action::ToggleMenu),
         bind("Tab", Action::ToggleLook),
         bind("N", Action::ToggleStatus),
         bind("Z", Action::ToggleTimes),
@@ -173,6 +179,14 @@ ActionText action_text(Action action)
         ->text;
 }
 
+std::vector<Action> all_actions()
+{
+    std::vector<Action> actions;
+    for (const NamedAction& named : kActions)
+        actions.push_back(named.action);
+    return actions;
+}
+
 const std::vector<Preset>& presets()
 {
     static const std::vector<Preset> all{f3d(), cad(), blender()};
@@ -228,6 +242,7 @@ std::vector<CheatSheetRow> cheat_sheet(const Preset& preset)
     }
     rows.push_back({"Mouse", "wheel", "zoom to what is under the pointer"});
     rows.push_back({"Mouse", "left click", "select a part's face"});
+    rows.push_back({"Mouse", "Ctrl + left click", "select more parts, or fewer"});
     rows.push_back({"Mouse", "left double click", "turn about the point under the pointer"});
     for (const NamedAction& named : kActions)
         if (std::string keys = chords_of(preset, named.action); !keys.empty())

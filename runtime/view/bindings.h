@@ -42,7 +42,10 @@ enum class Action {
     ShowAll,
     ClearSelection,
     ToggleMeasure,
+    Search,
     // panels
+    ToggleMenu,
+    ToggleTree,
     ToggleLook,
     ToggleStatus,
     ToggleTimes,
@@ -62,6 +65,8 @@ struct ActionText {
     const char* what;
 };
 ActionText action_text(Action action);
+/// All of them, as sheets and menus have them: those of a heading side by side.
+std::vector<Action> all_actions();
 
 enum class Drag { None, Orbit, Pan, Zoom };
 

@@ -1,8 +1,8 @@
-// What is drawn around and over the picture: panels, status line, messages, the cube of views, the cheat sheet.
+// What is drawn around and over the picture: the panels (panels.h, tree_panel.h), messages, the progress of opening.
 #pragma once
 
-#include "runtime/view/dimensions.h"
 #include "runtime/view/gl_picture.h"
+#include "runtime/view/tree_panel.h"
 #include "runtime/view/viewer.h"
 
 #include <cstdint>
@@ -22,20 +22,13 @@ public:
 private:
     void draw_picture(Viewer& viewer);
     void draw_selection(Viewer& viewer);
-    void draw_status(Viewer& viewer, int width, int height);
     void draw_toasts(Viewer& viewer);
     void draw_loading(Viewer& viewer);
-    void draw_cheat_sheet(Viewer& viewer, int width, int height);
-    void draw_view_cube(Viewer& viewer);
-    void draw_times(Viewer& viewer);
-    void draw_look(Viewer& viewer);
-    void draw_measure(Viewer& viewer);
-    float em() const;
 
     float scale_;
     GlPicture picture_, selection_;
-    uint64_t uploaded_ = 0, outlined_ = 0;
-    LengthUnit unit_ = LengthUnit::Millimetre;
+    uint64_t uploaded_ = 0;
+    TreePanel tree_;
     bool wants_pointer_ = false, wants_keys_ = false;
 };
 

@@ -157,9 +157,18 @@ Json report_of(const Viewer& viewer)
                         {"up", camera.up},
                         {"fov_deg", camera.fov_deg},
                         {"height_mm", camera.orthographic_mm}};
-    if (const std::optional<PickedPoint>& picked = viewer.selection())
-        report["selection"] = {
-            {"face", picked->face}, {"instance", picked->instance}, {"point", picked->point_mm}, {"uv", picked->uv}};
+    if (const Selection& selection = viewer.selection(); !selection.empty()) {
+        report["selection"]["placements"] = selection.placements;
+        if (selection.placements.size() == 1)
+            report["selection"]["instance"] = selection.placements.front();
+        if (selection.face)
+            report["selection"]["face"] = *selection.face;
+        if (selection.place) {
+            report["selection"]["point"] = selection.place->point_mm;
+            report["selection"]["uv"] = selection.place->uv;
+        }
+    }
+    report["hidden"] = viewer.hidden_count();
     if (const std::optional<SurfaceFacts>& facts = viewer.measured().last) {
         report["selection"]["kind"] = facts->kind_name;
         if (facts->radius_mm)

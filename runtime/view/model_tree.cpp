@@ -104,6 +104,13 @@ ModelTree::ModelTree(const PackImage& image) : image_(image), nodes_(std::max<si
         nodes_[nodes_[n].parent].placements += nodes_[n].placements;
         nodes_[nodes_[n].parent].faces += nodes_[n].faces;
     }
+    for (const PartRecord& part : image.parts) {
+        const uint first = part.face_count > 0 ? face_color(part.first_face).value_or(0) : 0;
+        bool alike = true;
+        for (uint i = 1; i < part.face_count && alike; ++i)
+            alike = face_color(part.first_face + i).value_or(0) == first;
+        part_color_.push_back(alike ? first : 0);
+    }
     for (uint n = 0; n < count; ++n) {
         nodes_[n].named = n < image.tree.size() && image.tree[n].name != 0;
         nodes_[n].color_rgba = n < image.tree.size() ? color_if_any(image.tree[n].color_rgba) : std::nullopt;
@@ -137,6 +144,16 @@ std::vector<uint> ModelTree::placements_below(uint node) const
     return found;
 }
 
+std::vector<uint64_t> ModelTree::count_below(std::span<const uint8_t> marked) const
+{
+    std::vector<uint64_t> counts(nodes_.size());
+    for (uint i = 0; i < image_.instances.size(); ++i)
+        counts[node_of(i)] += marked.empty() || marked[i] != 0;
+    for (size_t n = nodes_.size(); n-- > 1;)
+        counts[nodes_[n].parent] += counts[n];
+    return counts;
+}
+
 uint ModelTree::node_of(uint instance) const
 {
     return image_.tree.empty() ? 0 : image_.instances[instance].tree_node;
@@ -163,20 +180,24 @@ std::string ModelTree::part_label(uint part) const
     return name != 0 ? image_.strings.strings[name] : fmt::format("Part {}", part + 1);
 }
 
-std::vector<FaceEntry> ModelTree::faces_of_part(uint part) const
+std::string ModelTree::face_label(uint face) const
 {
-    std::vector<FaceEntry> entries;
-    const PartRecord& record = image_.parts[part];
-    for (uint i = 0; i < record.face_count; ++i) {
-        const uint id = record.first_face + i;
-        const FaceRecord& face = image_.faces[id];
-        const bool colored = (face.flags & kFaceHasColor) != 0;
-        entries.push_back({id,
-                           face.name != 0 ? image_.strings.strings[face.name]
-                                          : fmt::format("Face {} ({})", id, surface_kind_name(face.surface_kind)),
-                           colored ? std::optional(face.color_rgba) : std::nullopt});
-    }
-    return entries;
+    const FaceRecord& record = image_.faces[face];
+    return record.name != 0 ? image_.strings.strings[record.name]
+                            : fmt::format("Face {} ({})", face, surface_kind_name(record.surface_kind));
+}
+
+std::optional<uint> ModelTree::face_color(uint face) const
+{
+    const FaceRecord& record = image_.faces[face];
+    return (record.flags & kFaceHasColor) != 0 ? std::optional(record.color_rgba) : std::nullopt;
+}
+
+std::optional<uint> ModelTree::placement_color(uint instance) const
+{
+    const InstanceRecord& record = image_.instances[instance];
+    const std::optional<uint> of_faces = color_if_any(part_color_[record.part]);
+    return of_faces ? of_faces : color_if_any(record.color_rgba);
 }
 
 std::vector<uint> ModelTree::search(std::string_view text) const

@@ -1,5 +1,5 @@
-// A pack's assembly as a tree to show: nodes with names, colours and counts, the placements under each, the faces of a
-// part when they are asked for, and a search by names. Built once for a pack, by walks over its arrays.
+// A pack's assembly as a tree to show: nodes with names, colours and counts, the placements under each, names and
+// colours of faces, and a search by names. Built once for a pack, by walks over its arrays.
 #pragma once
 
 #include "format/pack_image.h"
@@ -23,12 +23,6 @@ struct ModelTreeNode {
     uint64_t placements = 0, faces = 0;
 };
 
-struct FaceEntry {
-    uint face = 0; // of the pack
-    std::string label;
-    std::optional<uint> color_rgba;
-};
-
 class ModelTree {
 public:
     /// Domain: a validated image, which must outlive it. A pack without a tree gets a root that holds all placements.
@@ -43,6 +37,9 @@ public:
     /// Those of its whole subtree, ascending.
     std::vector<uint> placements_below(uint node) const;
 
+    /// By node: how many placements of its subtree are marked; empty `marked`: all are.
+    std::vector<uint64_t> count_below(std::span<const uint8_t> marked) const;
+
     uint node_of(uint instance) const;
     /// From the root to the node: what has to be open to see it.
     std::vector<uint> path_to(uint node) const;
@@ -51,7 +48,13 @@ public:
     std::string placement_label(uint instance) const;
     /// A part's name, or "Part 3", counted from 1.
     std::string part_label(uint part) const;
-    std::vector<FaceEntry> faces_of_part(uint part) const;
+    /// A face's name, or "Face 4 (torus)" by its number in the pack.
+    std::string face_label(uint face) const;
+
+    /// sRGB, R in the low byte: a face's own; that of a placement as it is seen: what all of its faces have, else its
+    /// own.
+    std::optional<uint> face_color(uint face) const;
+    std::optional<uint> placement_color(uint instance) const;
 
     /// The nodes, ascending, whose label, or that of a placement or part placed right under them, has `text` in it.
     /// Letters of the Latin, Greek and Cyrillic alphabets match in either case. An empty text matches nothing.
@@ -68,6 +71,7 @@ private:
     std::vector<ModelTreeNode> nodes_;
     std::vector<uint> children_, child_begin_;       // of node i: children_[child_begin_[i] ... child_begin_[i + 1]]
     std::vector<uint> placements_, placement_begin_; // likewise
+    std::vector<uint> part_color_;                   // that all of its faces have; 0: there is none such
 };
 
 /// UTF-8 with capital letters of the Latin (to U+017F), Greek and Cyrillic alphabets made small.

@@ -3,6 +3,10 @@
 #include "format/leaf_geometry.h"
 #include "runtime/command_trace.h"
 
+#include <algorithm>
+#include <limits>
+#include <utility>
+
 namespace trimray {
 
 SceneRequest default_look()
@@ -56,10 +60,13 @@ SceneRequest scene_of(const ViewState& state)
     return scene;
 }
 
-Reach placement_reach(const PackImage& image, const PlacementView& placed, uint32_t instance)
+Reach placements_reach(const PackImage& image, const PlacementView& placed, std::vector<uint32_t> placements)
 {
-    return [&image, placed, instance](const std::array<double, 3>& direction) {
-        return largest_along(image, placed.instances[instance], direction);
+    return [&image, placed, placements = std::move(placements)](const std::array<double, 3>& direction) {
+        double farthest = -std::numeric_limits<double>::infinity();
+        for (const uint32_t placement : placements)
+            farthest = std::max(farthest, largest_along(image, placed.instances[placement], direction));
+        return farthest;
     };
 }
 

@@ -11,6 +11,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <vector>
 
 namespace trimray {
 
@@ -39,7 +40,7 @@ SceneCamera scene_camera(const Camera& camera);
 /// What the state asks for, as a scene file: its camera is the file's only one.
 SceneRequest scene_of(const ViewState& state);
 
-/// Of one placement where it stands, world mm; the pack and what is placed must outlive it.
-Reach placement_reach(const PackImage& image, const PlacementView& placed, uint32_t instance);
+/// Of some placements where they stand, world mm; the pack and what is placed must outlive it. Domain: some.
+Reach placements_reach(const PackImage& image, const PlacementView& placed, std::vector<uint32_t> placements);
 
 } // namespace trimray

@@ -12,6 +12,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <tuple>
 #include <utility>
 
 namespace trimray {
@@ -67,6 +68,12 @@ Camera turning_about_middle(Camera camera, const Reach& reach)
     if (way > 0)
         camera.target = camera.eye + forward * way;
     return camera;
+}
+
+bool same(const Camera& a, const Camera& b)
+{
+    return std::tie(a.eye, a.target, a.up, a.fov_deg, a.orthographic_mm) ==
+           std::tie(b.eye, b.target, b.up, b.fov_deg, b.orthographic_mm);
 }
 
 } // namespace
@@ -127,13 +134,16 @@ void Viewer::take_model()
     pictures_.finish(); // the old tracer is let go before its scene
     shown_.reset();
     hits_.reset();
-    selection_.reset();
-    ++shown_count_;
+    set_selection({});
+    tree_.reset();
     arrangement_ = {};
+    ++arrangement_count_;
     if (model_ && !keeps_view)
         state_.look.look.arrangement = {}; // its names were the other model's
     measured_ = {};
     model_ = std::move(**done);
+    tree_ = std::make_unique<ModelTree>(image());
+    ++model_count_;
     for (const std::string& note : model_->notes)
         tell(note);
     if (!keeps_view) {
@@ -141,10 +151,16 @@ void Viewer::take_model()
         if (!asked.eye && state_.camera.orthographic_mm > 0)
             asked.parallel = true;
         const Result<Camera> camera = camera_of(asked, placed(), visible_reach(), size().width, size().height);
-        if (camera.ok())
-            state_.camera = asked.eye ? *camera : turning_about_middle(*camera, visible_reach());
-        else
+        framing_ = nullptr;
+        if (!camera.ok())
             tell(camera.error().detail, true);
+        else if (asked.eye)
+            state_.camera = *camera;
+        else
+            look_framed([this, asked] {
+                return turning_about_middle(*camera_of(asked, placed(), visible_reach(), size().width, size().height),
+                                            visible_reach());
+            });
     }
     dirty_ = true;
 }
@@ -156,8 +172,11 @@ void Viewer::set_picture_rect(const PictureRect& rect)
     const bool same_size = rect.width == rect_.width && rect.height == rect_.height;
     rect_ = {rect.x, rect.y, std::max(rect.width, 1), std::max(rect.height, 1)};
     has_rect_ = true;
-    if (!same_size)
-        changed(true); // a window's border being dragged is a move
+    if (same_size)
+        return;
+    if (model_ && framing_ && same(state_.camera, framed_))
+        state_.camera = framed_ = framing_();
+    changed(true); // a window's border being dragged is a move
 }
 
 void Viewer::changed(bool moving)
@@ -302,13 +321,23 @@ void Viewer::look_from(const std::string& view)
 {
     if (!model_)
         return;
-    const double aspect = double(rect_.width) / rect_.height;
-    Camera camera = state_.camera;
-    if (state_.camera.orthographic_mm > 0)
-        standard_orthographic_view(view, visible_reach(), aspect, 0, camera);
-    else
-        standard_view(view, visible_reach(), aspect, camera.fov_deg, camera);
-    look_along(turning_about_middle(camera, visible_reach()));
+    look_framed([this, view, parallel = state_.camera.orthographic_mm > 0, fov_deg = state_.camera.fov_deg] {
+        const double aspect = double(rect_.width) / rect_.height;
+        Camera camera;
+        if (parallel)
+            standard_orthographic_view(view, visible_reach(), aspect, 0, camera);
+        else
+            standard_view(view, visible_reach(), aspect, fov_deg, camera);
+        camera.fov_deg = fov_deg; // also of parallel rays: for later
+        return turning_about_middle(camera, visible_reach());
+    });
+}
+
+void Viewer::look_framed(std::function<Camera()> framing)
+{
+    framing_ = std::move(framing);
+    framed_ = framing_();
+    look_along(framed_);
 }
 
 void Viewer::look_along(const Camera& camera)
@@ -320,8 +349,18 @@ void Viewer::look_along(const Camera& camera)
 // Where the look at hand puts everything. What it cannot is told by the picture that is ordered.
 PlacementView Viewer::placed()
 {
-    (void)arrangement_.change_to(image(), state_.look.look.arrangement);
+    if (const Result<bool> changed = arrangement_.change_to(image(), state_.look.look.arrangement);
+        changed.ok() && *changed)
+        ++arrangement_count_;
     return arrangement_.view(image());
+}
+
+size_t Viewer::hidden_count() const
+{
+    if (!model_)
+        return 0;
+    const PlacementView view = arrangement_.view(image());
+    return view.instances.size() - view.visible_count();
 }
 
 Reach Viewer::visible_reach()
@@ -329,11 +368,13 @@ Reach Viewer::visible_reach()
     return model_reach(image(), placed());
 }
 
-void Viewer::frame(const Reach& reach)
+void Viewer::frame(std::function<Reach()> reach)
 {
-    Camera camera = state_.camera;
-    frame_whole(camera, reach, double(rect_.width) / rect_.height);
-    look_along(turning_about_middle(camera, reach));
+    look_framed([this, reach = std::move(reach), from = state_.camera] {
+        Camera camera = from;
+        frame_whole(camera, reach(), double(rect_.width) / rect_.height);
+        return turning_about_middle(camera, reach());
+    });
 }
 
 void Viewer::set_preset(const Preset& preset)
@@ -395,25 +436,63 @@ std::array<double, 3> Viewer::point_under(double x, double y) const
     return point_at_target(state_.camera, px, py, size());
 }
 
-void Viewer::select(std::optional<PickedPoint> picked)
+void Viewer::set_selection(Selection selection)
 {
-    selection_ = std::move(picked);
+    selection_ = std::move(selection);
+    ++selection_count_;
     ++shown_count_; // its overlay is another
+}
+
+void Viewer::select_at(const std::optional<PickedPoint>& picked, bool adds)
+{
+    const std::optional<uint32_t> placement =
+        picked && picked->instance >= 0 ? std::optional(uint32_t(picked->instance)) : std::nullopt;
+    if (adds) {
+        if (placement)
+            select({*placement}, true);
+        return;
+    }
+    Selection selection;
+    if (placement)
+        selection.placements = {*placement};
+    if (placement && picked->face >= 0)
+        selection.face = uint32_t(picked->face);
+    selection.place = picked;
+    set_selection(std::move(selection));
     measured_.before = std::exchange(measured_.last, std::nullopt);
     measured_.edge.reset();
-    if (!selection_ || selection_->face < 0) {
+    if (!selection_.face) {
         measured_ = {};
         return;
     }
-    measured_.last =
-        surface_facts(image(), {uint32_t(selection_->face),
-                                uint32_t(selection_->instance),
-                                {selection_->uv[0], selection_->uv[1]},
-                                reference::Ray{to_vector(selection_->eye_mm), to_vector(selection_->along)}});
+    measured_.last = surface_facts(image(), {*selection_.face,
+                                             selection_.placements.front(),
+                                             {picked->uv[0], picked->uv[1]},
+                                             reference::Ray{to_vector(picked->eye_mm), to_vector(picked->along)}});
     measured_.edge = picked_edge(image(), *measured_.last);
 }
 
-void Viewer::click(double x, double y)
+void Viewer::select(std::vector<uint32_t> placements, bool adds)
+{
+    if (adds)
+        placements = toggled(selection_.placements, placements);
+    set_selection({.placements = std::move(placements), .face = {}, .place = {}});
+    measured_ = {};
+}
+
+void Viewer::select_face(uint32_t placement, uint32_t face)
+{
+    set_selection({.placements = {placement}, .face = face, .place = {}});
+    measured_ = {};
+}
+
+void Viewer::show(std::span<const uint32_t> placements, bool shown)
+{
+    set_shown(state_.look.look.arrangement, visible(), image().instances.size(), placements, shown);
+    changed();
+}
+
+void Viewer::click(double x, double y, bool adds)
 {
     const auto now = Clock::now();
     const bool is_double = now - last_click_ < kDoubleClick && std::hypot(x - click_x_, y - click_y_) <= kClickPixels;
@@ -423,7 +502,7 @@ void Viewer::click(double x, double y)
     if (is_double)
         recenter(x, y);
     else
-        select(pick(x, y));
+        select_at(pick(x, y), adds);
 }
 
 // Turns go about the point from now on; it comes into the picture's middle.
@@ -499,7 +578,7 @@ void Viewer::handle(const InputEvent& event)
         } else if ((buttons_ & 1u << event.code) != 0) {
             buttons_ &= ~(1u << event.code);
             if (event.code == kLeftButton && !dragged_ && buttons_ == 0)
-                click(pointer_x_, pointer_y_);
+                click(pointer_x_, pointer_y_, (drag_mods_ & kModControl) != 0);
             if (dragged_)
                 changed(true); // rests from now on
         }
@@ -549,6 +628,15 @@ void Viewer::act(Action action)
             begin_load();
         }
         return;
+    case Action::ToggleMenu:
+        panels.menu = !panels.menu;
+        return;
+    case Action::ToggleTree:
+        panels.tree = !panels.tree;
+        return;
+    case Action::Search:
+        panels.tree = panels.wants_search = true;
+        return;
     case Action::ToggleLook:
         panels.look = !panels.look;
         return;
@@ -568,7 +656,7 @@ void Viewer::act(Action action)
         turning_ = turning_ == Turning::Turntable ? Turning::Free : Turning::Turntable;
         return tell(turning_ == Turning::Turntable ? "turns like a turntable" : "turns freely");
     case Action::ClearSelection:
-        return select(std::nullopt);
+        return select({});
     default:
         break;
     }
@@ -576,11 +664,11 @@ void Viewer::act(Action action)
         return;
     switch (action) {
     case Action::Fit:
-        return frame(visible_reach());
+        return frame([this] { return visible_reach(); });
     case Action::FitSelection:
-        if (!selection_ || selection_->instance < 0)
-            return frame(visible_reach());
-        return frame(placement_reach(image(), placed(), uint32_t(selection_->instance)));
+        if (selection_.empty())
+            return frame([this] { return visible_reach(); });
+        return frame([this, fitted = selection_.placements] { return placements_reach(image(), placed(), fitted); });
     case Action::ToggleParallel:
         return look_along(state_.camera.orthographic_mm > 0 ? with_perspective(state_.camera)
                                                             : with_parallel_rays(state_.camera));
@@ -635,19 +723,21 @@ void Viewer::act(Action action)
         } else
             look.look.section.planes.clear();
         break;
-    case Action::HideSelection:
-        if (!selection_ || selection_->instance < 0)
+    case Action::HideSelection: {
+        if (selection_.empty())
             return tell("nothing is selected: click a part first");
-        look.look.arrangement.hide.push_back(fmt::format("@{}", selection_->instance));
-        select(std::nullopt);
-        break;
+        const std::vector<uint32_t> hidden = selection_.placements;
+        select({});
+        return show(hidden, false);
+    }
     case Action::IsolateSelection:
-        if (!selection_ || selection_->instance < 0)
+        if (selection_.empty())
             return tell("nothing is selected: click a part first");
-        look.look.arrangement.only = {fmt::format("@{}", selection_->instance)};
+        show_alone(look.look.arrangement, image().instances.size(), selection_.placements);
         break;
     case Action::ShowAll:
-        look.look.arrangement = {};
+        look.look.arrangement.only.clear();
+        look.look.arrangement.hide.clear();
         break;
     default: // the views
         return look_from(view_of(action));

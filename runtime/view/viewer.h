@@ -4,9 +4,12 @@
 
 #include "runtime/arrangement.h"
 #include "runtime/view/bindings.h"
+#include "runtime/view/dimensions.h"
 #include "runtime/view/edge_measure.h"
 #include "runtime/view/model_loader.h"
+#include "runtime/view/model_tree.h"
 #include "runtime/view/picture_thread.h"
+#include "runtime/view/selection.h"
 #include "runtime/view/surface_facts.h"
 #include "runtime/view/view_state.h"
 
@@ -14,7 +17,9 @@
 #include <chrono>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -25,16 +30,10 @@ struct PictureRect {
     int x = 0, y = 0, width = 1, height = 1;
 };
 
-/// What lies under a pixel, as the picture's arrays have it.
-struct PickedPoint {
-    int32_t face = -1, instance = -1; // face -1: a cap of a section
-    std::array<double, 3> point_mm{};
-    std::array<double, 2> uv{};
-    std::array<double, 3> eye_mm{}, along{}; // whence and along what it is seen
-};
-
+/// What is drawn around the picture.
 struct ViewerPanels {
-    bool look = false, status = true, times = false, cheat_sheet = false, measure = false;
+    bool menu = true, status = true, tree = false, look = false, times = false, cheat_sheet = false, measure = false;
+    bool wants_search = false; // the tree's field for it is to take the keys
 };
 
 /// What was picked last and before that, measured on the surfaces themselves, and the edge nearest to the last.
@@ -79,7 +78,13 @@ public:
     void changed(bool moving = false);
     void look_from(const std::string& view);
     void look_along(const Camera& camera);
-    void select(std::optional<PickedPoint> pick);
+    /// What was clicked, and measures it; nothing: selects nothing. `adds`: what is selected stays so, but what is
+    /// clicked again.
+    void select_at(const std::optional<PickedPoint>& pick, bool adds = false);
+    /// Ascending.
+    void select(std::vector<uint32_t> placements, bool adds = false);
+    void select_face(uint32_t placement, uint32_t face);
+    void show(std::span<const uint32_t> placements, bool shown);
     void tell(std::string text, bool is_error = false);
     /// Writes the picture, once it is complete, and beside it the scene file that makes it again.
     void save_picture(const std::string& file, bool transparent);
@@ -87,6 +92,8 @@ public:
 
     // ---- what there is ----
     const LoadedModel* model() const { return model_ ? &*model_ : nullptr; }
+    /// Counts up with each model that takes the place of another.
+    uint64_t model_count() const { return model_count_; }
     const PackImage& image() const { return model_->scene->pack.image; }
     ViewState& state() { return state_; }
     const ViewState& state() const { return state_; }
@@ -107,7 +114,16 @@ public:
     const ShownPicture* hits() const { return hits_ ? &*hits_ : nullptr; }
     /// What lies under a pixel of the picture.
     std::optional<PickedPoint> pick(double x, double y) const;
-    const std::optional<PickedPoint>& selection() const { return selection_; }
+    const Selection& selection() const { return selection_; }
+    /// Counts up with each change of the selection.
+    uint64_t selection_count() const { return selection_count_; }
+    /// Domain: there is a model, as below.
+    const ModelTree& tree() const { return *tree_; }
+    /// By placement, 0: hidden; empty: all are visible.
+    std::span<const uint8_t> visible() { return placed().visible; }
+    size_t hidden_count() const;
+    /// Counts up when other placements are visible, or elsewhere.
+    uint64_t arrangement_count() const { return arrangement_count_; }
     std::optional<PickedPoint> hovered() const;
     const MeasuredPicks& measured() const { return measured_; }
     const std::vector<Toast>& toasts() const { return toasts_; }
@@ -116,6 +132,7 @@ public:
     bool wants_quit() const { return quits_; }
 
     ViewerPanels panels;
+    LengthUnit unit = LengthUnit::Millimetre; // of what is told of places and measures
     std::function<void(const std::string& title)> on_title;
 
 private:
@@ -129,9 +146,11 @@ private:
     void drag_to(double x, double y);
     void zoom_at(double x, double y, double scale);
     std::array<double, 3> point_under(double x, double y) const;
-    void click(double x, double y);
+    void click(double x, double y, bool adds);
+    void set_selection(Selection selection);
     void recenter(double x, double y);
-    void frame(const Reach& reach);
+    void frame(std::function<Reach()> reach);
+    void look_framed(std::function<Camera()> framing);
     PlacementView placed();
     Reach visible_reach();
     std::array<double, 2> in_picture(double x, double y) const { return {x - rect_.x, y - rect_.y}; }
@@ -148,8 +167,13 @@ private:
     bool keeps_view_ = false; // the file that is being loaded is the one that is there, read again
     std::optional<Error> failure_;
     std::optional<LoadedModel> model_;
+    std::unique_ptr<const ModelTree> tree_;
     KeptArrangement arrangement_; // of the model's placements, as the look says
+    uint64_t model_count_ = 0, arrangement_count_ = 0;
 
+    // The last view that framed something, and how: while nobody moves away from it, it is framed anew for each size
+    std::function<Camera()> framing_;
+    Camera framed_;
     PictureRect rect_;
     bool has_rect_ = false;
     bool dirty_ = false, moving_ = false;
@@ -164,7 +188,8 @@ private:
     bool dragged_ = false;
     Clock::time_point last_click_{};
     std::array<double, 3> zoom_point_{};
-    std::optional<PickedPoint> selection_;
+    Selection selection_;
+    uint64_t selection_count_ = 0;
     MeasuredPicks measured_;
     std::vector<Toast> toasts_;
     struct PendingPicture {

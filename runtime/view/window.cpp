@@ -296,11 +296,15 @@ void Window::begin_frame(const std::vector<InputEvent>& events, double seconds)
             io.MouseWheel += static_cast<float>(event.y);
         } else if (event.kind == Kind::Key) {
             io.KeysDown[event.code] = event.down;
+        } else if (event.kind == Kind::Text) {
+            io.AddInputCharactersUTF8(event.text.c_str());
+            io.KeyCtrl = io.KeyAlt = false; // what is typed with them is no text
+        }
+        if (event.kind == Kind::Key || event.kind == Kind::Button) {
             io.KeyCtrl = (event.mods & kModControl) != 0;
             io.KeyShift = (event.mods & kModShift) != 0;
             io.KeyAlt = (event.mods & kModAlt) != 0;
-        } else if (event.kind == Kind::Text)
-            io.AddInputCharactersUTF8(event.text.c_str());
+        }
     }
     ImGui_ImplOpenGL3_NewFrame();
     ImGui::NewFrame();

@@ -92,13 +92,34 @@ class View(CliTest):
         if not OPTIONS.has_pack:
             self.skipTest("the golden pack has nothing there")
         report = self.view("wait\nmove 320 220\nclick 320 220\nwait\nwindow w.png\nreport r.json\n"
-                           "click 3 3\nwait\n")
+                           "click 3 60\nwait\n")
         picked = json.loads((self.folder / "r.json").read_text())["selection"]
         self.assertGreaterEqual(picked["face"], 0)
         self.assertEqual(picked["instance"], 0)
         self.assertNotIn("selection", report)  # the background is nothing
         width, height, _ = read_png(self.folder / "w.png")
         self.assertEqual((width, height), (640, 480))
+
+    def test_parts_are_found_by_name_hidden_and_shown_alone(self):
+        if not OPTIONS.has_pack:
+            self.skipTest("no converter in this build")
+        pack = self.folder / "two.tray"
+        self.ok("pack", MODEL.parent / "red_cube_blue_cylinder.step", "-o", pack)
+        report = self.view("wait\nkey Ctrl+F\nwait 0.2\ntext CYL\nwait 0.1\nkey Enter\nwait\nreport found.json\n"
+                           "window w.png\nkey Delete\nwait\nreport hidden.json\npicture left.png\nwait\n"
+                           "key Shift+I\nwait\nreport all.json\nkey Ctrl+F\nwait 0.2\nkey Enter\nwait\nkey I\nwait\n"
+                           "picture alone.png\nwait\n", files=[pack])
+        reports = {name: json.loads((self.folder / f"{name}.json").read_text()) for name in ["found", "hidden", "all"]}
+        found = reports["found"]["selection"]["placements"]
+        self.assertEqual(len(found), 1)
+        self.assertEqual([reports[name]["hidden"] for name in ["found", "hidden", "all"]], [0, 1, 0])
+        self.assertEqual(json.loads((self.folder / "left.json").read_text())["placements"],
+                         {"hide": [f"@{found[0]}"]})
+        self.assertEqual(report["hidden"], 1)
+        self.assertEqual(report["selection"]["placements"], found)
+        for name in ["left", "alone"]:
+            self.same_as_render(self.folder / f"{name}.png", report)
+        self.assertNotEqual((self.folder / "left.png").read_bytes(), (self.folder / "alone.png").read_bytes())
 
     def test_standard_views_are_those_of_render(self):
         report = self.view("wait\nkey 7\nwait\n", "--plain")

@@ -1,0 +1,50 @@
+// What all panels are made of.
+#pragma once
+
+#include <imgui.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <iterator>
+#include <string>
+#include <utility>
+
+namespace trimray {
+
+inline constexpr ImGuiWindowFlags kBare = ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove |
+                                          ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoNav |
+                                          ImGuiWindowFlags_NoFocusOnAppearing;
+inline constexpr ImGuiWindowFlags kPanel = ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoResize |
+                                           ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoCollapse |
+                                           ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoNav;
+
+inline void text(const std::string& words)
+{
+    ImGui::TextUnformatted(words.data(), words.data() + words.size());
+}
+
+/// The height of a letter: what lengths in the interface are counted in.
+inline float em()
+{
+    return ImGui::GetFontSize();
+}
+
+/// A choice among words; true: it was changed.
+template <class T, size_t N>
+bool choose(const char* label, T& value, const std::pair<T, const char*> (&choices)[N])
+{
+    bool changed = false;
+    const auto now =
+        std::find_if(std::begin(choices), std::end(choices), [&](const auto& c) { return c.first == value; });
+    if (!ImGui::BeginCombo(label, now == std::end(choices) ? "?" : now->second))
+        return false;
+    for (const auto& [choice, name] : choices)
+        if (ImGui::Selectable(name, choice == value)) {
+            changed = choice != value;
+            value = choice;
+        }
+    ImGui::EndCombo();
+    return changed;
+}
+
+} // namespace trimray
