@@ -105,6 +105,16 @@ public:
     std::vector<Finding> findings;
     LoadedPack pack;
 
+    void run_previews()
+    {
+        if (!read_header() || !read_table())
+            return;
+        check_sections();
+        for (size_t i = 0; i < table_.size() && findings.empty(); ++i)
+            if (const std::string id = id_of(table_[i]); id == kSectionPreview256 || id == kSectionPreview512)
+                load_section(i);
+    }
+
     void run()
     {
         if (!read_header() || !read_table())
@@ -518,11 +528,13 @@ Error error_of(const Finding& finding, const std::string& path)
     return error;
 }
 
-Result<LoadedPack> decode(const ByteSource& source, const std::string& path, const ReadOptions& options)
+/// What `run` makes a decoder read of a source. Fails: the first finding.
+Result<LoadedPack> decode(const ByteSource& source, const std::string& path, const ReadOptions& options,
+                          void (PackDecoder::*run)())
 {
     PackDecoder decoder(source, options, false);
     try {
-        decoder.run();
+        (decoder.*run)();
     } catch (const std::bad_alloc&) {
         return Error{ErrorCode::InvalidPack, path,
                      "its arrays do not fit into memory; lower the budget to be told earlier"};
@@ -532,9 +544,7 @@ Result<LoadedPack> decode(const ByteSource& source, const std::string& path, con
     return std::move(decoder.pack);
 }
 
-} // namespace
-
-Result<LoadedPack> read_pack(const std::string& path, const ReadOptions& options)
+Result<LoadedPack> decode_file(const std::string& path, const ReadOptions& options, void (PackDecoder::*run)())
 {
     const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
     if (descriptor < 0)
@@ -546,12 +556,27 @@ Result<LoadedPack> read_pack(const std::string& path, const ReadOptions& options
         return Error{ErrorCode::FileNotReadable, path, std::strerror(errno)};
     if (!S_ISREG(info.st_mode))
         return Error{ErrorCode::FileNotReadable, path, "not a regular file"};
-    return decode(ByteSource(descriptor, static_cast<uint64_t>(info.st_size)), path, options);
+    return decode(ByteSource(descriptor, static_cast<uint64_t>(info.st_size)), path, options, run);
+}
+
+} // namespace
+
+Result<LoadedPack> read_pack(const std::string& path, const ReadOptions& options)
+{
+    return decode_file(path, options, &PackDecoder::run);
+}
+
+Result<StoredPreviews> read_previews(const std::string& path)
+{
+    Result<LoadedPack> pack = decode_file(path, {}, &PackDecoder::run_previews);
+    if (!pack.ok())
+        return pack.error();
+    return StoredPreviews{std::move(pack->image.preview_256_png), std::move(pack->image.preview_512_png)};
 }
 
 Result<LoadedPack> decode_pack(std::span<const std::byte> bytes, const ReadOptions& options)
 {
-    return decode(ByteSource(bytes), "", options);
+    return decode(ByteSource(bytes), "", options, &PackDecoder::run);
 }
 
 std::vector<Finding> validate_pack(std::span<const std::byte> bytes)

@@ -45,6 +45,14 @@ struct LoadedPack {
 Result<LoadedPack> read_pack(const std::string& path, const ReadOptions& options);
 Result<LoadedPack> decode_pack(std::span<const std::byte> bytes, const ReadOptions& options);
 
+/// The pictures that a pack stores of itself, PNG; empty where it has none.
+struct StoredPreviews {
+    std::vector<std::byte> png_256, png_512;
+};
+
+/// Reads nothing else but the table of sections. Fails: as read_pack, of what is read.
+Result<StoredPreviews> read_previews(const std::string& path);
+
 /// All findings, for `trimray validate`; empty: the pack is valid.
 std::vector<Finding> validate_pack(std::span<const std::byte> bytes);
 

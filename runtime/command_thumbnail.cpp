@@ -56,18 +56,18 @@ Status write_png(const std::string& path, const Picture& picture, PngForm form =
 }
 
 /// The smallest stored preview that is no smaller than `size`, else the largest; empty where the pack has none.
-const std::vector<std::byte>& nearest_preview(const PackImage& image, uint32_t size)
+const std::vector<std::byte>& nearest_preview(const StoredPreviews& stored, uint32_t size)
 {
-    const bool small_is_enough = size <= kSmallPreview && !image.preview_256_png.empty();
-    return small_is_enough || image.preview_512_png.empty() ? image.preview_256_png : image.preview_512_png;
+    const bool small_is_enough = size <= kSmallPreview && !stored.png_256.empty();
+    return small_is_enough || stored.png_512.empty() ? stored.png_256 : stored.png_512;
 }
 
 Status write_thumbnail(const ThumbnailArguments& arguments)
 {
-    const Result<LoadedPack> pack = read_pack(arguments.pack, {});
-    if (!pack.ok())
-        return pack.error();
-    const std::vector<std::byte>& stored = nearest_preview(pack->image, arguments.size);
+    const Result<StoredPreviews> previews = read_previews(arguments.pack);
+    if (!previews.ok())
+        return previews.error();
+    const std::vector<std::byte>& stored = nearest_preview(*previews, arguments.size);
     if (stored.empty()) {
         report_note("the pack has no preview: tracing one");
         const Result<Picture> traced = render_square(arguments.pack, arguments.size);

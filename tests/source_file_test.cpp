@@ -1,7 +1,7 @@
 // A model's bytes out of files, compression and archives, sound and damaged ones, and the hashes of them.
 #include "preprocess/source/source_file.h"
 
-#include "preprocess/source/cad_names.h"
+#include "format/cad_names.h"
 #include "preprocess/source/content_hash.h"
 #include "preprocess/source/step_references.h"
 #include "preprocess/source/zip_archive.h"

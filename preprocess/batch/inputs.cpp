@@ -1,6 +1,6 @@
 #include "preprocess/batch/inputs.h"
 
-#include "preprocess/source/cad_names.h"
+#include "format/cad_names.h"
 #include "preprocess/source/source_file.h"
 #include "preprocess/worker/worker.h"
 

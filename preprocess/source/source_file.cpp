@@ -1,6 +1,6 @@
 #include "preprocess/source/source_file.h"
 
-#include "preprocess/source/cad_names.h"
+#include "format/cad_names.h"
 #include "preprocess/source/content_hash.h"
 
 #include <algorithm>

@@ -1,6 +1,6 @@
 #include "preprocess/source/zip_archive.h"
 
-#include "preprocess/source/cad_names.h"
+#include "format/cad_names.h"
 
 #include <algorithm>
 #include <archive.h>

@@ -45,11 +45,13 @@ constexpr NamedAction kActions[] = {
     {Action::ToggleMenu, {"Panels", "menu"}},
     {Action::ToggleTimes, {"Panels", "times of a picture"}},
     {Action::ToggleCheatSheet, {"Panels", "this sheet"}},
-    {Action::PreviousFile, {"Files", "previous file"}},
-    {Action::NextFile, {"Files", "next file"}},
+    {Action::OpenFile, {"Files", "open a file"}},
+    {Action::PreviousFile, {"Files", "previous file, or of the folder"}},
+    {Action::NextFile, {"Files", "next file, or of the folder"}},
     {Action::Reload, {"Files", "read the file again"}},
     {Action::Screenshot, {"Files", "save the picture"}},
     {Action::ScreenshotTransparent, {"Files", "save the picture without a background"}},
+    {Action::SaveTurntable, {"Files", "save 36 pictures of a turn"}},
     {Action::Quit, {"Files", "quit"}},
 };
 
@@ -91,6 +93,8 @@ std::vector<KeyBinding> common_keys()
         bind("Up", Action::Reload),
         bind("F12", Action::Screenshot),
         bind("F11", Action::ScreenshotTransparent),
+        bind("Shift+F12", Action::SaveTurntable),
+        bind("Ctrl+O", Action::OpenFile),
         bind("Escape", Action::Quit),
         bind("Ctrl+Q", Action::Quit),
     };

@@ -51,11 +51,13 @@ enum class Action {
     ToggleTimes,
     ToggleCheatSheet,
     // files
+    OpenFile,
     PreviousFile,
     NextFile,
     Reload,
     Screenshot,
     ScreenshotTransparent,
+    SaveTurntable,
     Quit,
 };
 

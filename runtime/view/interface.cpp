@@ -20,11 +20,6 @@ ImVec2 corner_of(const PictureRect& rect)
     return {float(rect.x), float(rect.y)};
 }
 
-ImTextureID texture_of(const GlPicture& picture)
-{
-    return reinterpret_cast<ImTextureID>(static_cast<uintptr_t>(picture.texture()));
-}
-
 /// What is selected, as a picture to lay over the one that is shown: placements tinted, their outline bright, the face
 /// itself brighter.
 Picture selection_overlay(const Frame& frame, const Selection& selected)
@@ -73,7 +68,8 @@ void Interface::draw(Viewer& viewer, int width, int height)
     if (panels.times && !panels.look)
         draw_times_panel(viewer, scale_);
     draw_toasts(viewer);
-    draw_loading(viewer);
+    draw_open(viewer);
+    draw_progress(viewer);
     if (panels.cheat_sheet)
         draw_cheat_sheet(viewer, width, height, scale_);
     wants_pointer_ = io.WantCaptureMouse;
@@ -126,35 +122,40 @@ void Interface::draw_toasts(Viewer& viewer)
     ImGui::End();
 }
 
-void Interface::draw_loading(Viewer& viewer)
+void Interface::draw_open(Viewer& viewer)
 {
-    const bool busy = viewer.loader().busy();
-    const bool invites = !busy && !viewer.model();
-    if (!busy && !invites)
+    const bool invites = !viewer.model() && !viewer.loader().busy();
+    if (invites || viewer.panels.open)
+        open_.draw(viewer, invites, scale_);
+    else
+        open_.forget();
+}
+
+void Interface::draw_progress(Viewer& viewer)
+{
+    const std::optional<std::array<size_t, 2>> series = viewer.series_progress();
+    if (!viewer.loader().busy() && !series)
         return;
     const PictureRect& rect = viewer.picture_rect();
-    ImGui::SetNextWindowPos({float(rect.x) + 0.5f * float(rect.width), float(rect.y) + 0.5f * float(rect.height)}, 0,
-                            {0.5f, 0.5f});
+    ImGui::SetNextWindowPos({float(rect.x) + 0.5f * float(rect.width), float(rect.y + rect.height) - 3 * em()}, 0,
+                            {0.5f, 1});
     ImGui::SetNextWindowBgAlpha(0.9f);
     ImGui::PushStyleVar(ImGuiStyleVar_WindowPadding, {16 * scale_, 12 * scale_});
-    ImGui::Begin("loading", nullptr, kBare | ImGuiWindowFlags_AlwaysAutoResize);
-    ImGui::PushTextWrapPos(30 * em());
-    if (busy) {
+    ImGui::Begin("progress", nullptr, kBare | ImGuiWindowFlags_AlwaysAutoResize);
+    if (viewer.loader().busy()) {
         const LoadProgress progress = viewer.loader().progress();
         text(fs::path(viewer.files()[viewer.file_index()]).filename().string());
         const std::string doing =
             progress.share >= 0 ? fmt::format("{}, {:.0f} %", progress.doing, 100 * progress.share) : progress.doing;
         ImGui::ProgressBar(progress.share >= 0 ? float(progress.share) : 0, {22 * em(), 0}, doing.c_str());
-        ImGui::SameLine();
-        if (ImGui::Button("Cancel"))
-            viewer.cancel_load();
-    } else if (viewer.failure()) {
-        text(viewer.failure()->where);
-        text(viewer.failure()->detail);
-        ImGui::TextDisabled("Drop another file here.");
-    } else
-        text("Drop a pack (.tray), a STEP or an IGES file here.");
-    ImGui::PopTextWrapPos();
+    } else {
+        text("saving pictures of a turn");
+        ImGui::ProgressBar(float((*series)[0]) / float((*series)[1]), {22 * em(), 0},
+                           fmt::format("{} of {}", (*series)[0], (*series)[1]).c_str());
+    }
+    ImGui::SameLine();
+    if (ImGui::Button("Cancel"))
+        viewer.loader().busy() ? viewer.cancel_load() : viewer.act(Action::Quit);
     ImGui::End();
     ImGui::PopStyleVar();
 }

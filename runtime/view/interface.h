@@ -2,6 +2,7 @@
 #pragma once
 
 #include "runtime/view/gl_picture.h"
+#include "runtime/view/open_panel.h"
 #include "runtime/view/tree_panel.h"
 #include "runtime/view/viewer.h"
 
@@ -23,12 +24,14 @@ private:
     void draw_picture(Viewer& viewer);
     void draw_selection(Viewer& viewer);
     void draw_toasts(Viewer& viewer);
-    void draw_loading(Viewer& viewer);
+    void draw_open(Viewer& viewer);
+    void draw_progress(Viewer& viewer);
 
     float scale_;
     GlPicture picture_, selection_;
     uint64_t uploaded_ = 0;
     TreePanel tree_;
+    OpenPanel open_;
     bool wants_pointer_ = false, wants_keys_ = false;
 };
 

@@ -8,6 +8,8 @@
 #include "runtime/image_io.h"
 #include "runtime/view/interface.h"
 #include "runtime/view/script.h"
+#include "runtime/view/settings.h"
+#include "runtime/view/user_folders.h"
 #include "runtime/view/viewer.h"
 #include "runtime/view/window.h"
 
@@ -15,6 +17,7 @@
 #include <fmt/format.h>
 
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <ctime>
 #include <exception>
@@ -34,13 +37,13 @@ constexpr const char* kProgram = "trimray-view";
 
 struct Options {
     std::vector<std::string> files;
-    std::string device = "auto", trim = "auto", closest = "certified", navigation = "f3d", size = "1280x800", scene;
-    std::string record, play, screenshots = ".";
+    std::string device = "auto", trim = "auto", closest = "certified", navigation, size, scene;
+    std::string record, play, screenshots = ".", state;
     ViewArguments view;
     DrawArguments draw;
     double error_px = RenderOptions{}.error_px;
     uint32_t threads = 0;
-    bool plain = false, json = false;
+    bool plain = false, json = false, no_state = false;
 };
 
 /// Nothing: help was asked for and given. Fails: Usage.
@@ -54,15 +57,18 @@ Result<std::optional<Options>> parse_options(int argc, char** argv)
     app.add_option("--closest", options.closest, "certified or stochastic")->capture_default_str();
     app.add_option("--error-px", options.error_px, "The error allowed, in pixels")->capture_default_str();
     app.add_option("--threads", options.threads, "Bounds the processor's threads; 0: all")->capture_default_str();
-    app.add_option("--size", options.size, "Of the window, WIDTHxHEIGHT")->capture_default_str();
-    app.add_option("--navigation", options.navigation, "Mouse and keys as in: f3d, cad or blender")
-        ->capture_default_str();
+    app.add_option("--size", options.size, "Of the window, WIDTHxHEIGHT; else as it was last, or 1280x800");
+    app.add_option("--navigation", options.navigation,
+                   "Mouse and keys as in: f3d, cad or blender; else as they were last, or f3d");
     app.add_option("--scene", options.scene, "A scene file: its first camera, its lights, materials and effects");
     app.add_flag("--plain", options.plain, "Begin without lines and with one sample a pixel, as render does");
     app.add_option("--screenshots", options.screenshots, "The folder that F12 saves pictures to")
         ->capture_default_str();
     app.add_option("--record", options.record, "Write what is done to a file");
     app.add_option("--play", options.play, "Do what such a file says, then close");
+    app.add_option("--state", options.state,
+                   "The folder that settings and recent files are kept in, else the user's own; not while playing");
+    app.add_flag("--no-state", options.no_state, "Begin with the defaults and keep nothing");
     app.add_flag("--json", options.json, "Report at the end as one JSON object");
     add_view_options(app, options.view);
     add_draw_options(app, options.draw);
@@ -83,8 +89,56 @@ Result<std::optional<Options>> parse_options(int argc, char** argv)
     return std::optional(options);
 }
 
+/// Whether the command line leaves it to the settings how things are drawn.
+bool keeps_look(const Options& options)
+{
+    return !options.plain && options.scene.empty();
+}
+
+/// Settings of the run before, and where this one's go.
+struct Kept {
+    std::string folder; // empty: nowhere
+    ViewerSettings settings;
+};
+
+/// Fails: as user_folder, read_settings.
+Result<Kept> read_kept(const Options& options)
+{
+    Kept kept;
+    if (options.no_state || (options.state.empty() && !options.play.empty()))
+        return kept; // a recording is the same wherever it is played
+    kept.folder = options.state;
+    if (kept.folder.empty()) {
+        const Result<std::string> folder = user_folder(UserFolder::State);
+        if (!folder.ok())
+            return folder.error();
+        kept.folder = *folder;
+    }
+    Result<ViewerSettings> settings = read_settings(kept.folder);
+    if (!settings.ok())
+        return settings.error();
+    kept.settings = std::move(*settings);
+    return kept;
+}
+
+/// Fails: as write_settings.
+Status keep(const Options& options, Kept kept, const Viewer& viewer, const Window& window)
+{
+    if (kept.folder.empty())
+        return Done{};
+    kept.settings.navigation = viewer.preset().name;
+    kept.settings.unit = viewer.unit;
+    kept.settings.panels = viewer.panels;
+    if (options.size.empty())
+        kept.settings.window = {uint32_t(std::lround(float(window.width()) / window.scale())),
+                                uint32_t(std::lround(float(window.height()) / window.scale()))};
+    if (keeps_look(options))
+        kept.settings.look = viewer.state().look;
+    return write_settings(kept.folder, kept.settings);
+}
+
 /// What the command line says of the picture. Fails: Usage; as read_scene_file.
-Result<Viewer::Start> understand(const Options& options)
+Result<Viewer::Start> understand(const Options& options, const Kept& kept)
 {
     for (const auto& [choice, value] :
          {std::pair{&device_choice(), &options.device}, std::pair{&trim_choice(), &options.trim},
@@ -92,7 +146,7 @@ Result<Viewer::Start> understand(const Options& options)
         if (const Status known = check_choice(*choice, *value); !known.ok())
             return known.error();
     Viewer::Start start;
-    start.preset = find_preset(options.navigation);
+    start.preset = find_preset(options.navigation.empty() ? kept.settings.navigation : options.navigation);
     if (!start.preset)
         return Error{ErrorCode::Usage, "--navigation",
                      fmt::format("expected f3d, cad or blender, found '{}'", options.navigation)};
@@ -103,6 +157,8 @@ Result<Viewer::Start> understand(const Options& options)
                      fmt::format("expected a part of a pixel in (0, 1], found {}", options.error_px)};
     if (!options.plain)
         start.state.look = default_look();
+    if (keeps_look(options) && kept.settings.look)
+        take_kept_look(*kept.settings.look, start.state.look);
     if (!options.scene.empty()) {
         Result<SceneRequest> scene = read_scene_file(options.scene);
         if (!scene.ok())
@@ -127,6 +183,7 @@ Result<Viewer::Start> understand(const Options& options)
     start.state.threads = options.threads;
     start.files = options.files;
     start.screenshot_folder = options.screenshots;
+    start.state_folder = kept.folder;
     start.make_tracer = [device = options.device](const std::shared_ptr<const Scene>& scene, std::string& note) {
         return make_tracer(scene, device, note);
     };
@@ -142,6 +199,8 @@ Json report_of(const Viewer& viewer)
         report["file"] = model->file;
         report["pack"] = model->pack;
         report["device"] = model->tracer->device_name();
+        report["faces"] = viewer.image().faces.size();
+        report["placements"] = viewer.image().instances.size();
         report["convert_seconds"] = model->convert_seconds;
         report["load_seconds"] = model->load_seconds;
     }
@@ -384,10 +443,16 @@ int run(int argc, char** argv)
     if (!*parsed)
         return kExitOk;
     const Options& options = **parsed;
-    const Result<PictureSize> size = parse_size(options.size, 1);
+    Result<Kept> kept = read_kept(options);
+    if (!kept.ok()) {
+        report_note(fmt::format("{}: {}; settings are not kept", kept.error().where, kept.error().detail));
+        kept = Kept{};
+    }
+    const Result<PictureSize> size =
+        options.size.empty() ? Result<PictureSize>(kept->settings.window) : parse_size(options.size, 1);
     if (!size.ok())
         return report_error(size.error(), kProgram);
-    Result<Viewer::Start> start = understand(options);
+    Result<Viewer::Start> start = understand(options, *kept);
     if (!start.ok())
         return report_error(start.error(), kProgram);
     std::deque<ScriptStep> script;
@@ -410,8 +475,12 @@ int run(int argc, char** argv)
         return report_error(window.error(), kProgram);
     Viewer viewer(std::move(*start));
     viewer.on_title = [&](const std::string& title) { (*window)->set_title(title + " - Trimray"); };
+    viewer.panels = kept->settings.panels;
+    viewer.unit = kept->settings.unit;
     Loop loop(**window, viewer, std::move(script), !options.play.empty(), std::move(recorder), milestones);
     const Status ran = loop.run();
+    if (const Status written = keep(options, *kept, viewer, **window); !written.ok())
+        report_note(fmt::format("{}: {}; settings are not kept", written.error().where, written.error().detail));
     if (options.json)
         fmt::print("{}\n", loop.report().dump());
     if (!ran.ok())

@@ -1,12 +1,13 @@
 #include "runtime/view/pack_cache.h"
 
+#include "runtime/view/user_folders.h"
+
 #include <fmt/format.h>
 #include <xxhash.h>
 
 #include <algorithm>
 #include <array>
 #include <cstdio>
-#include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <memory>
@@ -20,23 +21,7 @@ namespace fs = std::filesystem;
 
 Result<std::string> pack_cache_folder()
 {
-    const char* cache = std::getenv("XDG_CACHE_HOME");
-    const char* home = std::getenv("HOME");
-    fs::path folder;
-    if (cache && fs::path(cache).is_absolute()) // as the specification says, others are ignored
-        folder = cache;
-    else if (home && *home)
-        folder = fs::path(home) / ".cache";
-    else
-        return Error{ErrorCode::FileNotFound, "cache",
-                     "neither XDG_CACHE_HOME nor HOME is set; set one, or convert with 'trimray pack' first"};
-    folder /= "trimray/packs";
-    std::error_code failed;
-    fs::create_directories(folder, failed);
-    if (failed)
-        return Error{ErrorCode::FileNotWritable, folder.string(),
-                     fmt::format("cannot be made: {}; set XDG_CACHE_HOME to another folder", failed.message())};
-    return folder.string();
+    return user_folder(UserFolder::Cache, "packs");
 }
 
 Result<std::string> cached_pack_name(const std::string& cad_file)

@@ -3,9 +3,12 @@
 #include "format/pack_writer.h"
 #include "runtime/camera_frame.h"
 #include "runtime/command_trace.h"
+#include "runtime/command_views.h"
 #include "runtime/image_io.h"
 #include "runtime/scene_write.h"
 #include "runtime/trim_mode.h"
+#include "runtime/view/folder_models.h"
+#include "runtime/view/recent_files.h"
 
 #include <fmt/format.h>
 
@@ -20,8 +23,9 @@ namespace {
 namespace fs = std::filesystem;
 using namespace std::chrono_literals;
 
-constexpr auto kStillAfter = 150ms;       // without a move, a view rests
-constexpr auto kDoubleClick = 350ms;      // at most between two clicks
+constexpr auto kStillAfter = 150ms;  // without a move, a view rests
+constexpr auto kDoubleClick = 350ms; // at most between two clicks
+constexpr uint32_t kTurnSteps = 36;
 constexpr double kClickPixels = 4;        // that the pointer may move in a click
 constexpr double kZoomStep = 1.0 / 1.2;   // of distances, a step of the wheel
 constexpr double kZoomDragPixels = 150.0; // of a drag that makes distances e times as long
@@ -70,6 +74,17 @@ Camera turning_about_middle(Camera camera, const Reach& reach)
     return camera;
 }
 
+/// "folder/name1", or with the first number of which there is no file yet with this ending.
+std::string free_stem(const std::string& folder, const std::string& name, const std::string& ending)
+{
+    for (int number = 1;; ++number) {
+        const std::string stem = (fs::path(folder) / fmt::format("{}{}", name, number)).string();
+        std::error_code unknown; // writing it says so
+        if (!fs::exists(stem + ending, unknown))
+            return stem;
+    }
+}
+
 bool same(const Camera& a, const Camera& b)
 {
     return std::tie(a.eye, a.target, a.up, a.fov_deg, a.orthographic_mm) ==
@@ -81,7 +96,9 @@ bool same(const Camera& a, const Camera& b)
 Viewer::Viewer(Start start)
     : state_(std::move(start.state)), preset_(start.preset ? start.preset : &presets().front()),
       turning_(preset_->turning), wake_(std::move(start.wake)), screenshot_folder_(std::move(start.screenshot_folder)),
-      first_camera_(std::move(start.camera)), loader_(std::move(start.make_tracer), wake_), pictures_(wake_)
+      recent_list_(start.state_folder.empty() ? "" : start.state_folder + "/recent.json"),
+      first_camera_(std::move(start.camera)), watch_(wake_), loader_(std::move(start.make_tracer), wake_),
+      pictures_(wake_)
 {
     if (!start.files.empty())
         open(std::move(start.files));
@@ -93,15 +110,46 @@ void Viewer::open(std::vector<std::string> files, size_t index)
 {
     if (files.empty())
         return;
+    if (files.size() == 1 && files[0].ends_with(".json"))
+        return apply_scene(files[0]);
     files_ = std::move(files);
     file_index_ = index;
-    keeps_view_ = false;
+    keeps_view_ = remade_ = false;
+    begin_load();
+}
+
+void Viewer::step_file(int step)
+{
+    if (files_.empty())
+        return tell("there is no file yet: drop one, or press " + chords_of(*preset_, Action::OpenFile));
+    if (files_.size() == 1) { // then those beside it are meant
+        const std::string file = files_[0];
+        files_ = models_beside(file);
+        file_index_ = size_t(std::find(files_.begin(), files_.end(), file) - files_.begin()) % files_.size();
+    }
+    if (files_.size() < 2)
+        return tell("there is no other model in the folder");
+    file_index_ = (file_index_ + (step > 0 ? 1 : files_.size() - 1)) % files_.size();
+    keeps_view_ = remade_ = false;
+    begin_load();
+}
+
+// Written anew, it is read again.
+void Viewer::follow_file()
+{
+    if (loader_.busy() || series_ || !watch_.take_change())
+        return;
+    tell("the file was written anew: reading it again");
+    keeps_view_ = true;
     begin_load();
 }
 
 void Viewer::begin_load()
 {
     failure_.reset();
+    end_series("the turn is given up: another file is opened", true);
+    if (const Status watched = watch_.watch(files_[file_index_]); !watched.ok())
+        tell(fmt::format("{}: {}", watched.error().where, watched.error().detail));
     loader_.start(files_[file_index_]);
     if (on_title)
         on_title(fs::path(files_[file_index_]).filename().string());
@@ -146,6 +194,9 @@ void Viewer::take_model()
     ++model_count_;
     for (const std::string& note : model_->notes)
         tell(note);
+    if (!recent_list_.empty())
+        if (const Status kept = remember_file(recent_list_, {model_->file, model_->pack}); !kept.ok())
+            tell(fmt::format("{}: {}", kept.error().where, kept.error().detail), true);
     if (!keeps_view) {
         SceneCamera asked = std::exchange(first_camera_, std::nullopt).value_or(SceneCamera{});
         if (!asked.eye && state_.camera.orthographic_mm > 0)
@@ -174,6 +225,7 @@ void Viewer::set_picture_rect(const PictureRect& rect)
     has_rect_ = true;
     if (same_size)
         return;
+    end_series("the turn is given up: the picture's size has changed", true);
     if (model_ && framing_ && same(state_.camera, framed_))
         state_.camera = framed_ = framing_();
     changed(true); // a window's border being dragged is a move
@@ -207,12 +259,21 @@ void Viewer::fail_picture(const Error& error)
     if (!pending_.empty() && !save_failure_)
         save_failure_ = error;
     pending_.clear();
+    end_series("the turn is given up", true);
 }
 
 void Viewer::take_picture()
 {
-    if (const std::optional<Error> error = pictures_.take_error())
+    if (const std::optional<Error> error = pictures_.take_error()) {
+        // a device that was lost is asked for once more; all that was in its memory is made anew
+        if (error->code == ErrorCode::DeviceFailed && !remade_) {
+            tell(fmt::format("{}: the device failed; it is started anew", error->detail), true);
+            remade_ = keeps_view_ = true;
+            begin_load();
+            return;
+        }
         fail_picture(*error);
+    }
     std::optional<ShownPicture> picture = pictures_.take();
     if (!picture)
         return;
@@ -224,9 +285,13 @@ void Viewer::take_picture()
 
 void Viewer::update(Clock::time_point now)
 {
+    follow_file();
     take_model();
-    if (!model_)
+    if (!model_) {
+        moving_ = dirty_ = false; // there is nothing to be seen
+        std::erase_if(toasts_, [now](const Toast& toast) { return toast.until <= now; });
         return;
+    }
     take_picture();
     if (moving_ && now >= still_at_ && buttons_ == 0) {
         moving_ = false;
@@ -235,6 +300,7 @@ void Viewer::update(Clock::time_point now)
     if (std::exchange(dirty_, false))
         order(moving_);
     write_pending();
+    write_series();
     std::erase_if(toasts_, [now](const Toast& toast) { return toast.until <= now; });
 }
 
@@ -253,7 +319,7 @@ double Viewer::patience(Clock::time_point now) const
 
 bool Viewer::at_rest() const
 {
-    if (!has_rect_ || loader_.busy() || moving_ || dirty_ || !pending_.empty())
+    if (!has_rect_ || loader_.busy() || moving_ || dirty_ || !pending_.empty() || series_)
         return false;
     return !model_ || picture_failure_ || (shown_ && shown_->complete && shown_->order == ordered_);
 }
@@ -307,6 +373,104 @@ void Viewer::write_pending()
                          picture.file, model_->pack, sidecar, shown_->full_width, shown_->full_height,
                          accuracy_options()));
     }
+}
+
+void Viewer::save_turntable(uint32_t steps)
+{
+    if (!model_ || series_)
+        return;
+    Series series;
+    series.before = state_.camera;
+    ViewArguments turn;
+    turn.turntable = steps;
+    const Result<std::vector<Camera>> cameras =
+        cameras_for(turn, {scene_camera(state_.camera)}, image(), placed(), size().width, size().height);
+    if (!cameras.ok())
+        return tell(cameras.error().detail, true);
+    series.cameras = *cameras;
+    const std::string stem = free_stem(screenshot_folder_, fs::path(model_->file).stem().string() + "-turn-", ".json");
+    series.scene = stem + ".json";
+    const Result<std::vector<std::string>> files = picture_names(stem + "_%03d.png", steps);
+    if (!files.ok())
+        return tell(files.error().detail, true);
+    series.files = *files;
+    const std::string text = scene_text(scene_of(state_), series.scene) + "\n";
+    const auto bytes = std::as_bytes(std::span(text));
+    if (const Status written = write_file_atomically(series.scene, {bytes.begin(), bytes.end()}); !written.ok()) {
+        if (!save_failure_)
+            save_failure_ = written.error();
+        return tell(fmt::format("{}: {}", written.error().where, written.error().detail), true);
+    }
+    select({});
+    series_ = std::move(series);
+    look_along(series_->cameras.front());
+}
+
+void Viewer::write_series()
+{
+    if (!series_ || !shown_ || !shown_->complete || shown_->order != ordered_ || moving_ || dirty_)
+        return;
+    Series& series = *series_;
+    const Result<std::vector<std::byte>> png = encode_png(shown_->colours);
+    const Status written = png.ok() ? write_file_atomically(series.files[series.written], *png, Durability::Unsynced)
+                                    : Status(png.error());
+    if (!written.ok()) {
+        if (!save_failure_)
+            save_failure_ = written.error();
+        return end_series(fmt::format("{}: {}", written.error().where, written.error().detail), true);
+    }
+    if (++series.written < series.cameras.size())
+        return look_along(series.cameras[series.written]);
+    end_series(fmt::format("saved {} ... {}; the same again: trimray render {} --scene {} --turntable {} --size "
+                           "{}x{}{} -o turn_%03d.png",
+                           series.files.front(), series.files.back(), model_->pack, series.scene, series.cameras.size(),
+                           shown_->full_width, shown_->full_height, accuracy_options()),
+               false);
+}
+
+void Viewer::end_series(const std::string& why, bool is_error)
+{
+    if (!series_)
+        return;
+    const Camera before = series_->before;
+    series_.reset();
+    tell(why, is_error);
+    look_along(before);
+}
+
+std::optional<std::array<size_t, 2>> Viewer::series_progress() const
+{
+    return series_ ? std::optional(std::array{series_->written, series_->cameras.size()}) : std::nullopt;
+}
+
+void Viewer::apply_scene(const std::string& file)
+{
+    Result<SceneRequest> scene = read_scene_file(file);
+    if (!scene.ok())
+        return tell(fmt::format("{}: {}", scene.error().where, scene.error().detail), true);
+    std::shared_ptr<const Environment> environment;
+    if (scene->environment) {
+        Result<Environment> read = read_environment(*scene->environment);
+        if (!read.ok())
+            return tell(fmt::format("{}: {}", read.error().where, read.error().detail), true);
+        environment = std::make_shared<Environment>(std::move(*read));
+    }
+    const std::vector<SceneCamera> cameras = std::exchange(scene->cameras, {});
+    state_.look = std::move(*scene);
+    state_.environment = std::move(environment);
+    if (!model_) { // it is for the one that comes
+        if (!cameras.empty())
+            first_camera_ = cameras.front();
+        return tell(fmt::format("{}: for the next model", file));
+    }
+    if (!cameras.empty()) {
+        const Result<Camera> camera =
+            camera_of(cameras.front(), placed(), visible_reach(), size().width, size().height);
+        if (!camera.ok())
+            return tell(fmt::format("{}: {}", file, camera.error().detail), true);
+        state_.camera = *camera;
+    }
+    changed();
 }
 
 void Viewer::tell(std::string text, bool is_error)
@@ -552,6 +716,8 @@ void Viewer::drag_to(double x, double y)
 void Viewer::handle(const InputEvent& event)
 {
     using Kind = InputEvent::Kind;
+    if (series_ && (event.kind == Kind::Button || event.kind == Kind::Scroll))
+        return; // the view is the turn's
     switch (event.kind) {
     case Kind::Move:
         if (buttons_ != 0 && std::hypot(event.x - press_x_, event.y - press_y_) > kClickPixels)
@@ -607,21 +773,26 @@ void Viewer::handle(const InputEvent& event)
 void Viewer::act(Action action)
 {
     SceneRequest& look = state_.look;
-    const auto step_file = [&](size_t step) {
-        if (files_.size() < 2)
-            return tell("there is no other file");
-        file_index_ = (file_index_ + step) % files_.size();
-        keeps_view_ = false;
-        begin_load();
-    };
+    if (series_ && action == Action::Quit)
+        return end_series("the turn is given up", false);
+    if (series_)
+        return tell("pictures of a turn are being saved; " + chords_of(*preset_, Action::Quit) + " ends that");
     switch (action) {
     case Action::Quit:
-        quits_ = true;
+        if (panels.open) // what lies over the picture goes first
+            panels.open = false;
+        else if (panels.cheat_sheet)
+            panels.cheat_sheet = false;
+        else
+            quits_ = true;
         return;
     case Action::NextFile:
         return step_file(1);
     case Action::PreviousFile:
-        return step_file(files_.size() - 1);
+        return step_file(-1);
+    case Action::OpenFile:
+        panels.open = !panels.open;
+        return;
     case Action::Reload:
         if (!files_.empty()) {
             keeps_view_ = true;
@@ -678,15 +849,11 @@ void Viewer::act(Action action)
         return look_along(roll(state_.camera, 90));
     case Action::Screenshot:
     case Action::ScreenshotTransparent: {
-        const std::string stem = fs::path(model_->file).stem().string();
-        for (int number = 1;; ++number) {
-            const fs::path file = fs::path(screenshot_folder_) / fmt::format("{}-{}.png", stem, number);
-            std::error_code failed;
-            if (fs::exists(file, failed))
-                continue;
-            return save_picture(file.string(), action == Action::ScreenshotTransparent);
-        }
+        const std::string stem = free_stem(screenshot_folder_, fs::path(model_->file).stem().string() + "-", ".png");
+        return save_picture(stem + ".png", action == Action::ScreenshotTransparent);
     }
+    case Action::SaveTurntable:
+        return save_turntable(kTurnSteps);
     case Action::CycleEdges:
         look.edges = next_of(std::array{EdgeLines::None, EdgeLines::Sharp, EdgeLines::All},
                              look.edges.value_or(EdgeLines::None));

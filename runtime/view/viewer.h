@@ -6,12 +6,14 @@
 #include "runtime/view/bindings.h"
 #include "runtime/view/dimensions.h"
 #include "runtime/view/edge_measure.h"
+#include "runtime/view/file_watch.h"
 #include "runtime/view/model_loader.h"
 #include "runtime/view/model_tree.h"
 #include "runtime/view/picture_thread.h"
 #include "runtime/view/selection.h"
 #include "runtime/view/surface_facts.h"
 #include "runtime/view/view_state.h"
+#include "runtime/view/viewer_panels.h"
 
 #include <array>
 #include <chrono>
@@ -28,12 +30,6 @@ namespace trimray {
 /// Where the picture lies in the window, framebuffer pixels.
 struct PictureRect {
     int x = 0, y = 0, width = 1, height = 1;
-};
-
-/// What is drawn around the picture.
-struct ViewerPanels {
-    bool menu = true, status = true, tree = false, look = false, times = false, cheat_sheet = false, measure = false;
-    bool wants_search = false; // the tree's field for it is to take the keys
 };
 
 /// What was picked last and before that, measured on the surfaces themselves, and the edge nearest to the last.
@@ -61,6 +57,7 @@ public:
         TracerMaker make_tracer;
         std::function<void()> wake;
         std::string screenshot_folder = ".";
+        std::string state_folder; // where settings and recent files are kept; empty: they are not
     };
     explicit Viewer(Start start);
 
@@ -89,6 +86,10 @@ public:
     /// Writes the picture, once it is complete, and beside it the scene file that makes it again.
     void save_picture(const std::string& file, bool transparent);
     void cancel_load();
+    /// Takes over what a scene file says: its first camera, lights, materials, effects.
+    void apply_scene(const std::string& file);
+    /// Pictures of a turn around the model, one after another, as the picture thread has them.
+    void save_turntable(uint32_t steps);
 
     // ---- what there is ----
     const LoadedModel* model() const { return model_ ? &*model_ : nullptr; }
@@ -130,6 +131,10 @@ public:
     /// Nothing is being loaded, traced or saved, and nothing moves.
     bool at_rest() const;
     bool wants_quit() const { return quits_; }
+    /// The list of recent files; empty: none is kept.
+    const std::string& recent_list() const { return recent_list_; }
+    /// How many pictures of a turn are written, and of how many; nothing: none are.
+    std::optional<std::array<size_t, 2>> series_progress() const;
 
     ViewerPanels panels;
     LengthUnit unit = LengthUnit::Millimetre; // of what is told of places and measures
@@ -137,6 +142,10 @@ public:
 
 private:
     void begin_load();
+    void step_file(int step);
+    void follow_file();
+    void write_series();
+    void end_series(const std::string& why, bool is_error);
     void take_model();
     void take_picture();
     void order(bool moving);
@@ -160,7 +169,7 @@ private:
     const Preset* preset_;
     Turning turning_;
     std::function<void()> wake_;
-    std::string screenshot_folder_;
+    std::string screenshot_folder_, recent_list_;
     std::vector<std::string> files_;
     size_t file_index_ = 0;
     std::optional<SceneCamera> first_camera_;
@@ -197,12 +206,22 @@ private:
         bool transparent;
     };
     std::vector<PendingPicture> pending_;
+    struct Series { // of pictures, as a turn around the model
+        std::vector<Camera> cameras;
+        std::vector<std::string> files;
+        std::string scene;
+        size_t written = 0;
+        Camera before;
+    };
+    std::optional<Series> series_;
+    bool remade_ = false;                  // the tracer of this model was made anew after its device failed
     std::optional<Error> picture_failure_; // of what is ordered
     std::optional<Error> save_failure_;
     bool quits_ = false;
 
+    FileWatch watch_;
     ModelLoader loader_;
-    PictureThread pictures_; // last: both threads use what is above
+    PictureThread pictures_; // last: all threads use what is above
 };
 
 } // namespace trimray

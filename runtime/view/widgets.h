@@ -1,10 +1,13 @@
 // What all panels are made of.
 #pragma once
 
+#include "runtime/view/gl_picture.h"
+
 #include <imgui.h>
 
 #include <algorithm>
 #include <cstddef>
+#include <cstdint>
 #include <iterator>
 #include <string>
 #include <utility>
@@ -21,6 +24,11 @@ inline constexpr ImGuiWindowFlags kPanel = ImGuiWindowFlags_NoTitleBar | ImGuiWi
 inline void text(const std::string& words)
 {
     ImGui::TextUnformatted(words.data(), words.data() + words.size());
+}
+
+inline ImTextureID texture_of(const GlPicture& picture)
+{
+    return reinterpret_cast<ImTextureID>(static_cast<uintptr_t>(picture.texture()));
 }
 
 /// The height of a letter: what lengths in the interface are counted in.

@@ -4,6 +4,7 @@ import json
 import os
 import shutil
 import subprocess
+import threading
 import time
 
 from case import MODEL, OPTIONS, PACK, WORK, CliTest, run
@@ -46,11 +47,11 @@ class View(CliTest):
         self.folder.mkdir()
         self.cache = self.folder / "cache"  # drivers keep theirs in it too
 
-    def view(self, script, *arguments, files=(PACK,), timeout=120 * SLOW):
+    def view(self, script, *arguments, files=(PACK,), size="640x480", timeout=120 * SLOW):
         """Plays the lines and gives the report; the process, if it failed."""
         recording = self.folder / "script.txt"
         recording.write_text(script)
-        done = run("view", *files, "--play", recording, "--json", "--size", "640x480", "--device", "cpu", *arguments,
+        done = run("view", *files, "--play", recording, "--json", "--size", size, "--device", "cpu", *arguments,
                    env=dict(os.environ, DISPLAY=self.display, XDG_CACHE_HOME=str(self.cache)), cwd=self.folder,
                    timeout=timeout)
         if done.returncode != 0:
@@ -203,6 +204,79 @@ class View(CliTest):
         self.assertIn("press left", lines)
         second = self.view(lines.replace("close\n", "") + "wait\npicture b.png\n")
         self.assertEqual(second["camera"], first["camera"])
+        self.assertEqual((self.folder / "a.png").read_bytes(), (self.folder / "b.png").read_bytes())
+
+    def test_settings_and_recent_files_are_kept(self):
+        other = self.folder / "other.tray"
+        shutil.copy2(PACK, other)
+        keep = ("--state", self.folder / "state")
+        (self.folder / "state").mkdir()
+        self.view(f"wait\nkey E\nkey T\nwait\ndrop {other}\nwait 0.3\nwait\n", "--navigation", "blender", *keep)
+        settings = json.loads((self.folder / "state" / "settings.json").read_text())
+        self.assertEqual((settings["navigation"], settings["panels"]["tree"]), ("blender", True))
+        report = self.view("wait\npicture p.png\nkey Ctrl+O\nwait 0.2\nwindow w.png\nkey Escape\nwait\n", *keep)
+        self.assertEqual(report["preset"], "blender")
+        self.assertEqual(json.loads((self.folder / "p.json").read_text())["effects"]["edges"]["lines"], "all")
+        self.assertLess(report["picture"]["width"], 640)  # the tree is there
+        recent = [entry["file"] for entry in json.loads((self.folder / "state" / "recent.json").read_text())]
+        self.assertEqual(recent, [str(PACK), str(other)])
+        fresh = self.view("wait\n")  # a recording keeps and reads nothing but what it is told to
+        self.assertEqual((fresh["preset"], fresh["picture"]["width"]), ("f3d", 640))
+        broken = self.folder / "broken"
+        broken.mkdir()
+        (broken / "settings.json").write_text("{nonsense")
+        self.view("wait\n", "--state", broken)
+        self.assertEqual((broken / "settings.json").read_text(), "{nonsense")
+
+    def test_arrow_keys_go_through_the_folder(self):
+        models = self.folder / "models"
+        models.mkdir()
+        for name in ["b10.tray", "a.tray", "b9.tray", "notes.txt"]:
+            shutil.copy2(PACK, models / name)
+        seen = self.view("wait\nkey Right\nwait 0.1\nwait\nreport 1.json\nkey Right\nwait 0.1\nwait\nreport 2.json\n"
+                         "key Left\nkey Left\nwait 0.1\nwait\n", files=[models / "a.tray"])
+        seen = [json.loads((self.folder / f"{n}.json").read_text()) for n in (1, 2)] + [seen]
+        self.assertEqual([os.path.basename(report["file"]) for report in seen], ["b9.tray", "b10.tray", "a.tray"])
+
+    def test_a_file_that_is_written_anew_is_read_again(self):
+        if not OPTIONS.has_pack:
+            self.skipTest("no converter in this build")
+        first, second = self.folder / "model.tray", self.folder / "two.tray"
+        shutil.copy2(PACK, first)
+        self.ok("pack", MODEL.parent / "red_cube_blue_cylinder.step", "-o", second)
+        written = []
+
+        def replace():
+            while not (self.folder / "seen.json").exists():
+                time.sleep(0.02)
+            written.append(json.loads((self.folder / "seen.json").read_text())["placements"])
+            os.replace(second, first)
+
+        writer = threading.Thread(target=replace)
+        writer.start()
+        report = self.view(f"wait\ndrag left 300 200 350 260\nwait\nreport seen.json\nwait {1 * SLOW}\nwait\n",
+                           files=[first])
+        writer.join()
+        self.assertEqual((written, report["placements"]), ([1], 2))
+        self.assertEqual(report["camera"], json.loads((self.folder / "seen.json").read_text())["camera"])
+
+    def test_a_turn_is_saved_as_render_makes_it(self):
+        report = self.view("wait\nscroll 0 2\nwait\nkey Shift+F12\nwait\n", "--plain", size="160x120")
+        pictures = sorted(self.folder.glob("*-turn-1_*.png"))
+        self.assertEqual(len(pictures), 36)
+        scene = next(self.folder.glob("*-turn-1.json"))
+        size = f"{report['picture']['width']}x{report['picture']['height']}"
+        self.ok("render", PACK, "--scene", scene, "--turntable", 36, "--size", size, "--device", "cpu", "-o",
+                self.folder / "again_%03d.png")
+        for number, picture in enumerate(pictures):
+            again = self.folder / f"again_{number + 1:03}.png"
+            self.assertEqual(picture.read_bytes(), again.read_bytes(), picture)
+        self.assertNotEqual(pictures[0].read_bytes(), pictures[9].read_bytes())
+
+    def test_a_scene_file_that_is_dropped_brings_its_view_back(self):
+        report = self.view("wait\nkey O\ndrag left 300 200 380 260\nwait\npicture a.png\nwait\nreport a.txt\nkey 7\n"
+                           f"key O\nwait\ndrop {self.folder}/a.json\nwait\npicture b.png\nwait\n")
+        self.assertEqual(report["camera"], json.loads((self.folder / "a.txt").read_text())["camera"])
         self.assertEqual((self.folder / "a.png").read_bytes(), (self.folder / "b.png").read_bytes())
 
     def test_an_idle_window_leaves_the_processor_alone(self):

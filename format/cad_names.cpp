@@ -1,4 +1,4 @@
-#include "preprocess/source/cad_names.h"
+#include "format/cad_names.h"
 
 #include <algorithm>
 
