@@ -107,8 +107,6 @@ public:
     std::string device_name() const override { return "known errors"; }
     Result<Frame> render(const RenderOptions& options, RenderStats& stats) override
     {
-        if (options.is_cancelled())
-            return given_up();
         ++pictures;
         const bool stochastic = options.closest == ClosestPolicy::Stochastic;
         stats = {};

@@ -115,8 +115,6 @@ public:
     std::string device_name() const override { return "known times"; }
     Result<Frame> render(const RenderOptions& options, RenderStats& stats) override
     {
-        if (options.is_cancelled())
-            return given_up();
         EXPECT_FALSE(options.reuse_last);
         ++pictures;
         double ms = 10 + growth_ms * pictures;
@@ -240,6 +238,16 @@ TEST(effect_costs, can_be_given_up)
         EXPECT_EQ(costs.error().code, ErrorCode::Interrupted);
         EXPECT_LE(asked, after + 200) << "no picture is made any more, but the rest of its blocks say no";
     }
+}
+
+TEST(effect_costs, begin_no_picture_once_they_are_given_up)
+{
+    const PackImage image = kit_of({0, 1, 2, 3})->pack.image;
+    RenderOptions options = three_effects();
+    KnownTimes tracer;
+    options.cancelled = [&] { return tracer.pictures >= 7; };
+    EXPECT_EQ(measure_effect_costs(tracer, image, options, {}).error().code, ErrorCode::Interrupted);
+    EXPECT_EQ(tracer.pictures, 7);
 }
 
 TEST(effect_costs, end_in_time_with_what_was_measured)

@@ -122,6 +122,28 @@ TEST_F(balls_from_above, leave_open_what_a_hair_changes_and_which_of_two_at_one_
     EXPECT_EQ(errors().other_face, 1u);
 }
 
+TEST(view_reference, leaves_open_which_face_is_seen_a_hair_from_their_border)
+{
+    TracedScene sheets; // they meet at the hair beside the middle of the pixel at (0, 0)
+    constexpr double kBorder = 0.4 * kHairPx, kFar = 10;
+    const double half = 0.5 * (kFar + kBorder), other_half = 0.5 * (kFar - kBorder);
+    add_rectangle(sheets, {kBorder - half, 0, 0}, {0, 1, half}, {1, 1, kFar});
+    add_rectangle(sheets, {kBorder + other_half, 0, 0}, {0, 1, other_half}, {1, 1, kFar});
+    const auto scene = sheets.finish();
+    Result<ViewReference> reference = reference_of(scene, from_above());
+    ASSERT_TRUE(reference.ok());
+    Frame frame = draw(scene, from_above()).frame;
+    for (const int x : {0, -3}) {
+        for (const int32_t face : {0, 1}) {
+            frame.face[pixel_at(x, 0)] = face;
+            const ViewErrors found = *reference->errors(frame);
+            EXPECT_EQ(found.other_face, x == -3 && face == 1 ? 1u : 0u) << x << ", " << face;
+            EXPECT_EQ(found.open, x == 0 && face == 1 ? 1u : 0u) << x << ", " << face;
+        }
+        frame.face[pixel_at(x, 0)] = 0;
+    }
+}
+
 TEST(view_reference, knows_what_is_hidden_and_moved_apart)
 {
     const auto scene = kit_of({0, 1, 2, 3});
