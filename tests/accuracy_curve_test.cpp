@@ -235,7 +235,7 @@ TEST_F(accuracy_curves, can_be_given_up)
 {
     const auto tracer = make_cpu_tracer(scene_);
     ASSERT_TRUE(tracer.ok());
-    for (const int after : {0, 1, 500, 20000}) { // in a picture, in its comparison, in a later one
+    for (const int after : {0, 1, 500, 8000}) { // in a picture, in its comparison, in a later one
         std::atomic<int> asked{0};
         options_.cancelled = [&] { return asked++ >= after; };
         const Result<AccuracyCurve> curve = measure(**tracer, {.rounds = 1000, .seconds = 1000});

@@ -83,6 +83,8 @@ time_pictures(Tracer& tracer, std::span<const RenderOptions> pictures, const Tur
         if (paired)
             paired(times);
     }
+    if (options.progress && done < turns) // time was short
+        options.progress(1);
     return times;
 }
 
