@@ -104,6 +104,18 @@ std::vector<std::string> gone(const std::vector<EffectItem>& all, const std::vec
     return names;
 }
 
+/// No error of a measured effect is then less than the median of them all.
+void raise_to_median(std::vector<EffectCost>& effects)
+{
+    std::vector<double> errors;
+    for (const EffectCost& effect : effects)
+        if (effect.ms)
+            errors.push_back(effect.error_ms);
+    for (EffectCost& effect : effects)
+        if (effect.ms)
+            effect.error_ms = std::max(effect.error_ms, median(errors));
+}
+
 } // namespace
 
 std::vector<std::string> removable_effects()
@@ -175,6 +187,7 @@ Result<EffectCosts> measure_effect_costs(Tracer& tracer, const PackImage& image,
         costs.effects[i].error_ms = median_error(differences);
         costs.effects[i].work_without = without.work;
     }
+    raise_to_median(costs.effects);
     return costs;
 }
 

@@ -27,8 +27,10 @@ struct EffectCost {
     std::vector<std::string> takes_along; // other items that go where it is turned off
     std::optional<double> ms; // what the picture takes more because of it, below 0 where it saves time; none: it is the
                               // pack's or cannot be turned off
-    double error_ms = 0;      // standard error of ms, from how its rounds spread
-    WorkCounts work_without;  // of the picture without it, where it can be turned off
+    // Standard error of ms, from how its rounds spread; never less than the median of all effects' errors, for a few
+    // rounds may agree by chance
+    double error_ms = 0;
+    WorkCounts work_without; // of the picture without it, where it can be turned off
 };
 
 struct EffectCosts {
