@@ -15,18 +15,19 @@ static_assert(uint(SurfaceMap::None) == kMapNone && uint(SurfaceMap::Zebra) == k
               uint(SurfaceMap::CurvatureMean) == kMapMean && uint(SurfaceMap::CurvatureMax) == kMapLarger &&
               uint(SurfaceMap::CurvatureMin) == kMapSmaller && uint(SurfaceMap::Draft) == kMapDraft);
 
-bool is_curvature(SurfaceMap map)
-{
-    return map >= SurfaceMap::CurvatureGaussian && map <= SurfaceMap::CurvatureMin;
-}
-
 double length_of(const std::array<double, 3>& v)
 {
     return std::hypot(v[0], v[1], v[2]);
 }
 
-/// The curvatures that the ends of the scale stand for.
-std::array<double, 2> range_of(const PackImage& image, const SurfaceMapLook& look)
+} // namespace
+
+bool is_curvature(SurfaceMap map)
+{
+    return map >= SurfaceMap::CurvatureGaussian && map <= SurfaceMap::CurvatureMin;
+}
+
+std::array<double, 2> curvature_range(const PackImage& image, const SurfaceMapLook& look)
 {
     if (look.range)
         return *look.range;
@@ -38,8 +39,6 @@ std::array<double, 2> range_of(const PackImage& image, const SurfaceMapLook& loo
         end *= end;
     return {-end, end};
 }
-
-} // namespace
 
 const char* surface_map_name(SurfaceMap map)
 {
@@ -114,7 +113,7 @@ MapView map_view(const PackImage& image, const SurfaceMapLook& look)
         view.direction[i] = float(length > 0 ? look.direction[i] / length : 0);
     view.stripes = float(look.stripes);
     if (is_curvature(look.map)) {
-        const auto [lo, hi] = range_of(image, look);
+        const auto [lo, hi] = curvature_range(image, look);
         view.per_range = float(2 / (hi - lo));
         view.range_middle = float((hi + lo) / (hi - lo));
     }

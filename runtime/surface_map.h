@@ -8,6 +8,8 @@
 #include "runtime/tracer.h"
 #include "shaders/frame_layout.h"
 
+#include <array>
+
 namespace trimray {
 
 /// The name of a map on the command line and in the effect plan: zebra, isophotes, curvature-gaussian, curvature-mean,
@@ -24,6 +26,12 @@ bool has_map(const RenderOptions& options);
 /// bounds, Gaussian curvature +- the square of it: a ball whose radius is a kCurvatureRange-th of the model has full
 /// colour.
 inline constexpr double kCurvatureRange = 10;
+
+/// The curvatures that the ends of the scale stand for, 1/mm or 1/mm^2. Domain: a map of curvatures.
+std::array<double, 2> curvature_range(const PackImage& image, const SurfaceMapLook& look);
+
+/// Whether a map is one of the four curvatures.
+bool is_curvature(SurfaceMap map);
 
 inline constexpr uint32_t kMostStripes = 10000;
 

@@ -68,18 +68,6 @@ bool is_surrounded(const Frame& frame, size_t i)
 
 } // namespace
 
-Spread spread(std::vector<double> values)
-{
-    if (values.empty())
-        return {};
-    std::sort(values.begin(), values.end());
-    double sum = 0;
-    for (const double value : values)
-        sum += value;
-    const size_t rank = size_t(std::ceil(0.99 * double(values.size()))); // the nearest-rank percentile, from 1
-    return {sum / double(values.size()), values[rank - 1], values.back()};
-}
-
 PictureErrors picture_errors(ReferencePicture& reference, const Frame& frame)
 {
     const Frame& right = reference.frame();

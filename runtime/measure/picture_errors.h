@@ -3,19 +3,12 @@
 #pragma once
 
 #include "runtime/closest_errors.h"
+#include "runtime/spread.h"
 #include "runtime/tracer.h"
 
 #include <cstdint>
-#include <vector>
 
 namespace trimray {
-
-/// Of one quantity, over many pixels; zeros where there are none.
-struct Spread {
-    double mean = 0, at_99 = 0, largest = 0; // at_99: 99 % are no larger
-};
-/// `values` in any order.
-Spread spread(std::vector<double> values);
 
 struct PictureErrors {
     ClosestErrors answers; // PSNR too

@@ -79,6 +79,10 @@ FN real sqrt(real a)
 {
     return __builtin_sqrtf(a);
 }
+FN real floor(real a)
+{
+    return __builtin_floorf(a);
+}
 // of NaN and a number: the second argument, as of lanes
 FN real min(real a, real b)
 {
