@@ -97,6 +97,9 @@ void Interface::draw(Viewer& viewer, int width, int height)
 
 void Interface::draw_picture(Viewer& viewer)
 {
+    if (viewer.early())
+        return draw_early(viewer);
+    proxy_.clear();
     const ShownPicture* shown = viewer.shown();
     if (!shown)
         return;
@@ -112,6 +115,22 @@ void Interface::draw_picture(Viewer& viewer)
     list->AddImage(texture_of(picture_), corner_of(rect), end);
     if (viewer.selection() && selection_.texture() != 0)
         list->AddImage(texture_of(selection_), corner_of(rect), end);
+}
+
+void Interface::draw_early(Viewer& viewer)
+{
+    const PictureRect& rect = viewer.picture_rect();
+    const Status drawn =
+        proxy_.draw(viewer.early(), viewer.placed(), viewer.state(), {uint32_t(rect.width), uint32_t(rect.height)});
+    if (!drawn.ok()) {
+        viewer.tell(fmt::format("{}: {}", drawn.error().where, drawn.error().detail), true);
+        return;
+    }
+    if (!proxy_.is_drawn())
+        return;
+    ImGui::GetBackgroundDrawList()->AddImage(reinterpret_cast<ImTextureID>(static_cast<uintptr_t>(proxy_.texture())),
+                                             corner_of(rect), {float(rect.x + rect.width), float(rect.y + rect.height)},
+                                             {0, 1}, {1, 0});
 }
 
 void Interface::draw_selection(Viewer& viewer)
@@ -187,8 +206,9 @@ void Interface::draw_loading(Viewer& viewer)
     if (!busy && !invites)
         return;
     const PictureRect& rect = viewer.picture_rect();
-    ImGui::SetNextWindowPos({float(rect.x) + 0.5f * float(rect.width), float(rect.y) + 0.5f * float(rect.height)}, 0,
-                            {0.5f, 0.5f});
+    const float down = viewer.early() ? 0.97f : 0.5f; // out of the picture's way
+    ImGui::SetNextWindowPos({float(rect.x) + 0.5f * float(rect.width), float(rect.y) + down * float(rect.height)}, 0,
+                            {0.5f, down});
     ImGui::SetNextWindowBgAlpha(0.9f);
     ImGui::PushStyleVar(ImGuiStyleVar_WindowPadding, {16 * scale_, 12 * scale_});
     ImGui::Begin("loading", nullptr, kBare | ImGuiWindowFlags_AlwaysAutoResize);
@@ -300,7 +320,7 @@ bool is_inside(const ImVec2 (&quad)[4], ImVec2 p)
 
 void Interface::draw_view_cube(Viewer& viewer)
 {
-    if (!viewer.model())
+    if (!viewer.model() && !viewer.early())
         return;
     using namespace camera_math;
     const PictureRect& rect = viewer.picture_rect();

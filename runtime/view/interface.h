@@ -3,6 +3,7 @@
 
 #include "runtime/view/dimensions.h"
 #include "runtime/view/gl_picture.h"
+#include "runtime/view/gl_proxy.h"
 #include "runtime/view/viewer.h"
 
 #include <cstdint>
@@ -18,9 +19,12 @@ public:
     /// Whether the pointer, or the keys, are the interface's now: the viewer does not get them.
     bool wants_pointer() const { return wants_pointer_; }
     bool wants_keys() const { return wants_keys_; }
+    /// The first picture, drawn until there is a traced one.
+    const GlProxy& proxy() const { return proxy_; }
 
 private:
     void draw_picture(Viewer& viewer);
+    void draw_early(Viewer& viewer);
     void draw_selection(Viewer& viewer);
     void draw_status(Viewer& viewer, int width, int height);
     void draw_toasts(Viewer& viewer);
@@ -34,6 +38,7 @@ private:
 
     float scale_;
     GlPicture picture_, selection_;
+    GlProxy proxy_;
     uint64_t uploaded_ = 0, outlined_ = 0;
     LengthUnit unit_ = LengthUnit::Millimetre;
     bool wants_pointer_ = false, wants_keys_ = false;

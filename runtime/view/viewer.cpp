@@ -95,6 +95,7 @@ void Viewer::open(std::vector<std::string> files, size_t index)
 void Viewer::begin_load()
 {
     failure_.reset();
+    return_to_model();
     loader_.start(files_[file_index_]);
     if (on_title)
         on_title(fs::path(files_[file_index_]).filename().string());
@@ -103,10 +104,70 @@ void Viewer::begin_load()
 void Viewer::cancel_load()
 {
     loader_.cancel();
+    return_to_model();
     if (!model_)
         failure_ = Error{ErrorCode::Interrupted, files_.empty() ? "" : files_[file_index_], "opening was cancelled"};
     else
         tell("cancelled");
+}
+
+// The view at hand is that of the model again, which another file was to replace.
+void Viewer::return_to_model()
+{
+    reloaded_early_.reset();
+    if (!before_)
+        return;
+    state_.camera = before_->camera;
+    state_.look.look.arrangement = before_->arrangement;
+    before_.reset();
+    early_.reset();
+    forget_pictures();
+    dirty_ = true;
+}
+
+void Viewer::forget_pictures()
+{
+    shown_.reset();
+    hits_.reset();
+    selection_.reset();
+    ++shown_count_;
+    arrangement_ = {};
+    measured_ = {};
+}
+
+void Viewer::take_first_view()
+{
+    SceneCamera asked = std::exchange(first_camera_, std::nullopt).value_or(SceneCamera{});
+    if (!asked.eye && state_.camera.orthographic_mm > 0)
+        asked.parallel = true;
+    const Result<Camera> camera = camera_of(asked, placed(), visible_reach(), size().width, size().height);
+    if (camera.ok())
+        state_.camera = asked.eye ? *camera : turning_about_middle(*camera, visible_reach());
+    else
+        tell(camera.error().detail, true);
+}
+
+void Viewer::take_early()
+{
+    if (!has_rect_)
+        return; // as of a model
+    std::shared_ptr<const EarlyModel> early = loader_.take_early();
+    if (!early)
+        return;
+    if (loader_.busy() && keeps_view_ && model_) {
+        reloaded_early_ = std::move(early); // what is there stays until the model is
+        return;
+    }
+    early_ = std::move(early);
+    ++shown_count_;
+    if (!loader_.busy())
+        return; // the model is there, its first picture not yet
+    pictures_.cancel();
+    forget_pictures();
+    before_ = {state_.camera, state_.look.look.arrangement};
+    if (model_)
+        state_.look.look.arrangement = {}; // its names were the other model's
+    take_first_view();
 }
 
 void Viewer::take_model()
@@ -118,34 +179,26 @@ void Viewer::take_model()
         return;
     if (!done->ok()) {
         const Error& error = done->error();
+        return_to_model();
         tell(fmt::format("{}: {}", error.where, error.detail), true);
         if (!model_ || model_->file != files_[file_index_])
             failure_ = error;
         return;
     }
     const bool keeps_view = keeps_view_ && model_;
+    const bool was_early = before_.has_value();
+    before_.reset();
+    if (!was_early)
+        early_ = std::exchange(reloaded_early_, nullptr);
     pictures_.finish(); // the old tracer is let go before its scene
-    shown_.reset();
-    hits_.reset();
-    selection_.reset();
-    ++shown_count_;
-    arrangement_ = {};
-    if (model_ && !keeps_view)
+    forget_pictures();
+    if (model_ && !keeps_view && !was_early)
         state_.look.look.arrangement = {}; // its names were the other model's
-    measured_ = {};
     model_ = std::move(**done);
     for (const std::string& note : model_->notes)
         tell(note);
-    if (!keeps_view) {
-        SceneCamera asked = std::exchange(first_camera_, std::nullopt).value_or(SceneCamera{});
-        if (!asked.eye && state_.camera.orthographic_mm > 0)
-            asked.parallel = true;
-        const Result<Camera> camera = camera_of(asked, placed(), visible_reach(), size().width, size().height);
-        if (camera.ok())
-            state_.camera = asked.eye ? *camera : turning_about_middle(*camera, visible_reach());
-        else
-            tell(camera.error().detail, true);
-    }
+    if (!keeps_view && !was_early)
+        take_first_view();
     dirty_ = true;
 }
 
@@ -201,22 +254,24 @@ void Viewer::take_picture()
     if (picture->samples == 1)
         hits_ = *picture;
     shown_ = std::move(picture);
+    early_.reset();
 }
 
 void Viewer::update(Clock::time_point now)
 {
+    take_early();
     take_model();
-    if (!model_)
-        return;
-    take_picture();
     if (moving_ && now >= still_at_ && buttons_ == 0) {
         moving_ = false;
         dirty_ = true;
     }
+    std::erase_if(toasts_, [now](const Toast& toast) { return toast.until <= now; });
+    if (!model())
+        return;
+    take_picture();
     if (std::exchange(dirty_, false))
         order(moving_);
     write_pending();
-    std::erase_if(toasts_, [now](const Toast& toast) { return toast.until <= now; });
 }
 
 double Viewer::patience(Clock::time_point now) const
@@ -241,7 +296,7 @@ bool Viewer::at_rest() const
 
 void Viewer::save_picture(const std::string& file, bool transparent)
 {
-    if (model_ && !picture_failure_)
+    if (model() && !picture_failure_)
         pending_.push_back({file, transparent});
     else if (!save_failure_)
         save_failure_ = picture_failure_
@@ -300,7 +355,7 @@ void Viewer::tell(std::string text, bool is_error)
 
 void Viewer::look_from(const std::string& view)
 {
-    if (!model_)
+    if (!has_view())
         return;
     const double aspect = double(rect_.width) / rect_.height;
     Camera camera = state_.camera;
@@ -320,13 +375,13 @@ void Viewer::look_along(const Camera& camera)
 // Where the look at hand puts everything. What it cannot is told by the picture that is ordered.
 PlacementView Viewer::placed()
 {
-    (void)arrangement_.change_to(image(), state_.look.look.arrangement);
-    return arrangement_.view(image());
+    (void)arrangement_.change_to(outline(), state_.look.look.arrangement);
+    return arrangement_.view(outline());
 }
 
 Reach Viewer::visible_reach()
 {
-    return model_reach(image(), placed());
+    return model_reach(outline(), placed());
 }
 
 void Viewer::frame(const Reach& reach)
@@ -380,6 +435,8 @@ std::optional<PickedPoint> Viewer::hovered() const
 std::array<double, 3> Viewer::point_under(double x, double y) const
 {
     const auto [px, py] = in_picture(x, y);
+    if (!model())
+        return point_at_target(state_.camera, px, py, size());
     if (state_.look.look.arrangement.any() || !state_.look.look.section.planes.empty()) { // one ray meets all there is
         if (const std::optional<PickedPoint> picked = pick(x, y))
             return picked->point_mm;
@@ -477,7 +534,7 @@ void Viewer::handle(const InputEvent& event)
     case Kind::Move:
         if (buttons_ != 0 && std::hypot(event.x - press_x_, event.y - press_y_) > kClickPixels)
             dragged_ = true;
-        if (buttons_ != 0 && dragged_ && model_)
+        if (buttons_ != 0 && dragged_ && has_view())
             drag_to(event.x, event.y);
         pointer_x_ = event.x;
         pointer_y_ = event.y;
@@ -491,7 +548,7 @@ void Viewer::handle(const InputEvent& event)
                 press_x_ = pointer_x_;
                 press_y_ = pointer_y_;
                 dragged_ = false;
-                if (model_)
+                if (has_view())
                     zoom_point_ = point_under(pointer_x_, pointer_y_);
             }
             buttons_ |= 1u << event.code;
@@ -505,7 +562,7 @@ void Viewer::handle(const InputEvent& event)
         }
         break;
     case Kind::Scroll:
-        if (model_ && event.y != 0)
+        if (has_view() && event.y != 0)
             zoom_at(pointer_x_, pointer_y_, std::pow(kZoomStep, event.y));
         break;
     case Kind::Key:
@@ -572,7 +629,7 @@ void Viewer::act(Action action)
     default:
         break;
     }
-    if (!model_)
+    if (!has_view())
         return;
     switch (action) {
     case Action::Fit:
@@ -590,6 +647,8 @@ void Viewer::act(Action action)
         return look_along(roll(state_.camera, 90));
     case Action::Screenshot:
     case Action::ScreenshotTransparent: {
+        if (!model())
+            return tell("there is no picture yet");
         const std::string stem = fs::path(model_->file).stem().string();
         for (int number = 1;; ++number) {
             const fs::path file = fs::path(screenshot_folder_) / fmt::format("{}-{}.png", stem, number);
@@ -629,7 +688,7 @@ void Viewer::act(Action action)
         if (look.look.section.planes.empty()) {
             SectionPlane plane; // through the middle, what is nearer is cut away
             for (size_t axis = 0; axis < 3; ++axis)
-                plane.point_mm[axis] = 0.5 * (image().bounds_lo_mm[axis] + image().bounds_hi_mm[axis]);
+                plane.point_mm[axis] = 0.5 * (outline().bounds_lo_mm[axis] + outline().bounds_hi_mm[axis]);
             plane.normal = {0, -1, 0};
             look.look.section.planes = {plane};
         } else

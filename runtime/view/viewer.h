@@ -86,7 +86,12 @@ public:
     void cancel_load();
 
     // ---- what there is ----
-    const LoadedModel* model() const { return model_ ? &*model_ : nullptr; }
+    /// None while what is seen is the first picture of a file that is still being read.
+    const LoadedModel* model() const { return model_ && !before_ ? &*model_ : nullptr; }
+    /// What is to be drawn in place of a picture, as long as there is none.
+    std::shared_ptr<const EarlyModel> early() const { return shown_ ? nullptr : early_; }
+    /// What is placed where, of the model or of what is drawn before it.
+    PlacementView placed();
     const PackImage& image() const { return model_->scene->pack.image; }
     ViewState& state() { return state_; }
     const ViewState& state() const { return state_; }
@@ -120,7 +125,13 @@ public:
 
 private:
     void begin_load();
+    void take_early();
     void take_model();
+    void forget_pictures();
+    void take_first_view();
+    void return_to_model();
+    bool has_view() const { return model_ || before_; }
+    const PackImage& outline() const { return before_ ? early_->outline : image(); }
     void take_picture();
     void order(bool moving);
     void fail_picture(const Error& error);
@@ -132,7 +143,6 @@ private:
     void click(double x, double y);
     void recenter(double x, double y);
     void frame(const Reach& reach);
-    PlacementView placed();
     Reach visible_reach();
     std::array<double, 2> in_picture(double x, double y) const { return {x - rect_.x, y - rect_.y}; }
     PictureSize size() const { return {uint32_t(rect_.width), uint32_t(rect_.height)}; }
@@ -148,7 +158,15 @@ private:
     bool keeps_view_ = false; // the file that is being loaded is the one that is there, read again
     std::optional<Error> failure_;
     std::optional<LoadedModel> model_;
-    KeptArrangement arrangement_; // of the model's placements, as the look says
+    // of the model, until its first picture, or of what is seen before it is there; of a file that is read again
+    std::shared_ptr<const EarlyModel> early_, reloaded_early_;
+    /// The model's view, to return to if the file that is seen early does not become the model.
+    struct ViewBefore {
+        Camera camera;
+        Arrangement arrangement;
+    };
+    std::optional<ViewBefore> before_; // set while a file is seen early and its model is not there: early_ is, too
+    KeptArrangement arrangement_;      // of what outline() places, as the look says
 
     PictureRect rect_;
     bool has_rect_ = false;
