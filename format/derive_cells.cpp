@@ -189,13 +189,13 @@ FaceCells choose_cells(std::span<const MonotonePiece> pieces, std::span<const ui
 
 } // namespace
 
-void derive_cells(PackImage& image)
+void derive_cells(PackImage& image, const std::function<bool()>& cancelled)
 {
     const std::vector<uint> alike = first_alike(image);
     std::vector<FaceCells> built(image.faces.size());
     tbb::parallel_for(size_t{0}, image.faces.size(), [&](size_t f) {
         const FaceRecord& face = image.faces[f];
-        if (face.piece_count == 0 || alike[f] != f)
+        if (face.piece_count == 0 || alike[f] != f || (cancelled && cancelled()))
             return;
         const std::span<const uint> words(image.trim_pieces.data() + face.first_piece, face.piece_count);
         std::vector<MonotonePiece> pieces;

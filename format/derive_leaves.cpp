@@ -428,14 +428,14 @@ void add_bezier_leaves(PackImage& image, uint patch_id, const LeafOptions& optio
 
 } // namespace
 
-void derive_leaves(PackImage& image, const LeafOptions& options)
+void derive_leaves(PackImage& image, const LeafOptions& options, const std::function<bool()>& cancelled)
 {
     constexpr size_t kChunk = 64; // patches a task: fixed, so that the order does not depend on threads
     const size_t chunks = (image.patches.size() + kChunk - 1) / kChunk;
     std::vector<std::vector<LeafRecord>> made(chunks);
     tbb::parallel_for(size_t{0}, chunks, [&](size_t chunk) {
         const size_t last = std::min(image.patches.size(), (chunk + 1) * kChunk);
-        for (size_t p = chunk * kChunk; p < last; ++p) {
+        for (size_t p = chunk * kChunk; p < last && !(cancelled && cancelled()); ++p) {
             if ((image.patches[p].shape & 0xffu) == kKindBezier)
                 add_bezier_leaves(image, uint(p), options, made[chunk]);
             else

@@ -298,7 +298,7 @@ void spread_unspent(PackImage& image, double total_bytes, const std::vector<doub
 
 } // namespace
 
-void derive_sdf(PackImage& image)
+void derive_sdf(PackImage& image, const std::function<bool()>& cancelled)
 {
     for (FaceRecord& face : image.faces) {
         if (!has_texture(face))
@@ -312,7 +312,7 @@ void derive_sdf(PackImage& image)
     const std::vector<uint> alike = first_alike(image);
     std::vector<std::vector<uint>> textures(image.faces.size());
     tbb::parallel_for(size_t{0}, image.faces.size(), [&](size_t f) {
-        if (has_texture(image.faces[f]) && alike[f] == f)
+        if (has_texture(image.faces[f]) && alike[f] == f && !(cancelled && cancelled()))
             textures[f] = make_texture(image, image.faces[f]);
     });
     image.sdf_words.clear();

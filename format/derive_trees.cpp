@@ -131,14 +131,14 @@ Box3d world_bounds(const InstanceRecord& instance, const PartRecord& part, const
 
 /// The model's box in world mm: what its leaves' own boxes reach, tighter than the tree's.
 void set_bounds(const PackImage& image, std::span<const InstanceRecord> instances, std::span<const uint8_t> visible,
-                TopTree& tree)
+                const std::function<bool()>& cancelled, TopTree& tree)
 {
     tbb::parallel_for(0, 6, [&](int side) {
         const int c = side / 2;
         Point3 d{};
         d[c] = side % 2 == 0 ? -1 : 1;
         double reach = -kInf;
-        for (size_t i = 0; i < instances.size(); ++i)
+        for (size_t i = 0; i < instances.size() && !(cancelled && cancelled()); ++i)
             if (visible.empty() || visible[i] != 0)
                 reach = std::max(reach, largest_along(image, instances[i], d));
         (side % 2 == 0 ? tree.bounds_lo_mm : tree.bounds_hi_mm)[c] = d[c] * reach;
@@ -146,7 +146,7 @@ void set_bounds(const PackImage& image, std::span<const InstanceRecord> instance
 }
 
 TopTree build_top(const PackImage& image, std::span<const InstanceRecord> instances, std::span<const uint8_t> visible,
-                  RTCDevice device)
+                  RTCDevice device, const std::function<bool()>& cancelled)
 {
     constexpr int kLevels = 3; // up to 64 boxes a part
     std::vector<std::vector<Box3d>> of_part(image.parts.size());
@@ -191,25 +191,27 @@ TopTree build_top(const PackImage& image, std::span<const InstanceRecord> instan
             if (child != kBvhEmpty && (child & kBvhLeaf) != 0)
                 child = kBvhLeaf | ids[child & ~kBvhLeaf];
     tree.nodes = std::move(bvh.nodes);
-    set_bounds(image, instances, visible, tree);
+    set_bounds(image, instances, visible, cancelled, tree);
     return tree;
 }
 
 } // namespace
 
-void derive_trees(PackImage& image)
+void derive_trees(PackImage& image, const std::function<bool()>& cancelled)
 {
     RTCDevice device = rtcNewDevice(nullptr);
     std::vector<std::vector<BvhNode>> trees(image.parts.size());
-    tbb::parallel_for(size_t{0}, image.parts.size(),
-                      [&](size_t p) { trees[p] = build_part(image, image.parts[p], device); });
+    tbb::parallel_for(size_t{0}, image.parts.size(), [&](size_t p) {
+        if (!cancelled || !cancelled())
+            trees[p] = build_part(image, image.parts[p], device);
+    });
     image.part_nodes.clear();
     for (size_t p = 0; p < trees.size(); ++p) {
         image.parts[p].first_node = uint(image.part_nodes.size());
         image.parts[p].node_count = uint(trees[p].size());
         image.part_nodes.insert(image.part_nodes.end(), trees[p].begin(), trees[p].end());
     }
-    TopTree tree = build_top(image, image.instances, {}, device);
+    TopTree tree = build_top(image, image.instances, {}, device, cancelled);
     rtcReleaseDevice(device);
     image.top_nodes = std::move(tree.nodes);
     if (image.top_nodes.empty())
@@ -224,7 +226,7 @@ TopTree derive_top_tree(const PackImage& image, std::span<const InstanceRecord> 
                         std::span<const uint8_t> visible)
 {
     RTCDevice device = rtcNewDevice(nullptr);
-    TopTree tree = build_top(image, instances, visible, device);
+    TopTree tree = build_top(image, instances, visible, device, {});
     rtcReleaseDevice(device);
     return tree;
 }

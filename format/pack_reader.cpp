@@ -1,6 +1,7 @@
 #include "format/pack_reader.h"
 
 #include "format/derive.h"
+#include "format/load_watch.h"
 #include "format/pack_file.h"
 #include "format/pack_filter.h"
 #include "format/pack_predict.h"
@@ -97,8 +98,8 @@ KnownSection known_section(std::string_view id)
 
 class PackDecoder {
 public:
-    PackDecoder(const ByteSource& source, const ReadOptions& options, bool keep_going)
-        : source_(source), options_(options), keep_going_(keep_going)
+    PackDecoder(const ByteSource& source, const ReadOptions& options, const LoadWatch& watch, bool keep_going)
+        : source_(source), options_(options), watch_(watch), keep_going_(keep_going)
     {
     }
 
@@ -122,21 +123,69 @@ public:
         check_sections();
         if (!findings.empty())
             return; // sizes and offsets cannot be trusted: nothing is allocated from them
-        for (size_t i = 0; i < table_.size(); ++i)
-            if (keep_going_ || findings.empty())
-                load_section(i);
-        if (!findings.empty())
+        if (!load_all_sections() || !findings.empty())
             return;
         check_facts();
         if (!findings.empty())
             return;
         if (pack.image.compact)
             derive();
-        if (findings.empty())
-            findings = validate_image(pack.image);
+        if (findings.empty() && !watch_.is_cancelled())
+            findings = validate_image(pack.image, watch_.cancelled);
     }
 
 private:
+    /// False: given up.
+    bool load_all_sections()
+    {
+        std::vector<bool> loaded(table_.size());
+        const auto load = [&](size_t i) {
+            if (!loaded[i] && (keep_going_ || findings.empty()) && !watch_.is_cancelled())
+                load_section(i);
+            loaded[i] = true;
+        };
+        if (tells_outline()) {
+            for (size_t i = 0; i < table_.size(); ++i)
+                if (is_in_outline(id_of(table_[i])))
+                    load(i);
+            tell_outline();
+        }
+        for (size_t i = 0; i < table_.size(); ++i)
+            load(i);
+        return !watch_.is_cancelled();
+    }
+
+    bool has_proxy() const
+    {
+        return std::any_of(table_.begin(), table_.end(),
+                           [](const SectionEntry& e) { return id_of(e) == kSectionProxy; });
+    }
+
+    bool tells_outline() const { return watch_.on_outline && !pack.image.compact && has_proxy(); }
+
+    /// The smaller part, from which a first picture can be drawn.
+    static bool is_in_outline(const std::string& id)
+    {
+        constexpr std::string_view kLater[] = {
+            kSectionPreview256, kSectionPreview512, "CTRL", "TPNT", "TPCE", "CELL", "CENT", "SDFW"};
+        return std::find(std::begin(kLater), std::end(kLater), id) == std::end(kLater);
+    }
+
+    void tell_outline()
+    {
+        if (!findings.empty() || watch_.is_cancelled())
+            return;
+        check_facts();
+        const bool is_valid = findings.empty() && is_valid_outline(pack.image, watch_.cancelled);
+        findings.clear(); // the checks of the whole find them again
+        if (!is_valid)
+            return;
+        PackImage outline = pack.image;
+        if (!options_.previews_and_proxy)
+            pack.image.proxy_draco = {};
+        watch_.on_outline(std::move(outline));
+    }
+
     void fault(int number, std::string section, std::string detail)
     {
         findings.push_back({number, std::move(section), std::move(detail)});
@@ -317,6 +366,8 @@ private:
         const std::string id = id_of(e);
         if (known_section(id).stride == 0)
             return false;
+        if (id == kSectionProxy && tells_outline())
+            return true;
         const bool is_extra = id == kSectionPreview256 || id == kSectionPreview512 || id == kSectionProxy;
         return options_.previews_and_proxy || !is_extra;
     }
@@ -357,10 +408,18 @@ private:
     bool read_stored(const SectionEntry& e, Bytes& stored)
     {
         stored.resize(e.stored_bytes);
-        if (!source_.read(e.offset, stored)) {
-            fault(3100, id_of(e), "the file became shorter while it was read");
-            return false;
+        constexpr size_t kPiece = 16 << 20; // a few milliseconds from memory, a tenth of a second from a slow disk
+        for (size_t done = 0; done < stored.size(); done += kPiece) {
+            if (watch_.is_cancelled())
+                return false;
+            const size_t size = std::min(kPiece, stored.size() - done);
+            if (!source_.read(e.offset + done, std::span(stored).subspan(done, size))) {
+                fault(3100, id_of(e), "the file became shorter while it was read");
+                return false;
+            }
         }
+        if (watch_.is_cancelled())
+            return false;
         if (xxh3(stored.data(), stored.size()) != e.stored_xxh3) {
             fault(3117, id_of(e), "the checksum of its stored bytes does not match");
             return false;
@@ -411,6 +470,8 @@ private:
         }
         std::atomic<size_t> damaged = SIZE_MAX;
         tbb::parallel_for(size_t{0}, frames.size(), [&](size_t i) {
+            if (watch_.is_cancelled())
+                return;
             std::span<std::byte> target = out.subspan(i * frame_bytes);
             target = target.first(std::min<size_t>(target.size(), frame_bytes));
             Bytes columns;
@@ -430,6 +491,8 @@ private:
             fault(3128, id_of(e), fmt::format("frame {} is damaged", damaged.load()));
             return false;
         }
+        if (watch_.is_cancelled())
+            return false;
         if (e.filter == kFilterPredicted)
             restore_records(id_of(e), pack.image, out);
         return true;
@@ -488,9 +551,9 @@ private:
     void derive()
     {
         PackImage& image = pack.image;
-        findings = validate_image(image);
-        if (!findings.empty())
-            return;
+        findings = validate_image(image, watch_.cancelled);
+        if (!findings.empty() || watch_.is_cancelled())
+            return; // what has not been checked to its end is not to be used
         uint64_t texture_bytes = 0;
         for (const FaceRecord& f : image.faces)
             texture_bytes += 4 * texture_shape(f).words_at_most();
@@ -499,14 +562,19 @@ private:
                   fmt::format("{} bytes of textures, the budget is {}", texture_bytes, options_.max_decoded_bytes));
             return;
         }
-        derive_leaves(image, LeafOptions(image.leaf_options));
-        derive_trees(image);
-        derive_cells(image);
-        derive_sdf(image);
+        const std::function<bool()>& cancelled = watch_.cancelled;
+        derive_leaves(image, LeafOptions(image.leaf_options), cancelled);
+        if (!watch_.is_cancelled())
+            derive_trees(image, cancelled);
+        if (!watch_.is_cancelled())
+            derive_cells(image, cancelled);
+        if (!watch_.is_cancelled())
+            derive_sdf(image, cancelled);
     }
 
     const ByteSource& source_;
     const ReadOptions& options_;
+    const LoadWatch& watch_;
     const bool keep_going_;
     PackHeader header_{};
     FactRecord facts_{};
@@ -530,21 +598,24 @@ Error error_of(const Finding& finding, const std::string& path)
 
 /// What `run` makes a decoder read of a source. Fails: the first finding.
 Result<LoadedPack> decode(const ByteSource& source, const std::string& path, const ReadOptions& options,
-                          void (PackDecoder::*run)())
+                          const LoadWatch& watch, void (PackDecoder::*run)())
 {
-    PackDecoder decoder(source, options, false);
+    PackDecoder decoder(source, options, watch, false);
     try {
         (decoder.*run)();
     } catch (const std::bad_alloc&) {
         return Error{ErrorCode::InvalidPack, path,
                      "its arrays do not fit into memory; lower the budget to be told earlier"};
     }
+    if (watch.is_cancelled())
+        return Error{ErrorCode::Interrupted, path, "opening was cancelled"};
     if (!decoder.findings.empty())
         return error_of(decoder.findings.front(), path);
     return std::move(decoder.pack);
 }
 
-Result<LoadedPack> decode_file(const std::string& path, const ReadOptions& options, void (PackDecoder::*run)())
+Result<LoadedPack> decode_file(const std::string& path, const ReadOptions& options, const LoadWatch& watch,
+                               void (PackDecoder::*run)())
 {
     const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
     if (descriptor < 0)
@@ -556,19 +627,24 @@ Result<LoadedPack> decode_file(const std::string& path, const ReadOptions& optio
         return Error{ErrorCode::FileNotReadable, path, std::strerror(errno)};
     if (!S_ISREG(info.st_mode))
         return Error{ErrorCode::FileNotReadable, path, "not a regular file"};
-    return decode(ByteSource(descriptor, static_cast<uint64_t>(info.st_size)), path, options, run);
+    return decode(ByteSource(descriptor, static_cast<uint64_t>(info.st_size)), path, options, watch, run);
 }
 
 } // namespace
 
 Result<LoadedPack> read_pack(const std::string& path, const ReadOptions& options)
 {
-    return decode_file(path, options, &PackDecoder::run);
+    return read_pack(path, options, LoadWatch{});
+}
+
+Result<LoadedPack> read_pack(const std::string& path, const ReadOptions& options, const LoadWatch& watch)
+{
+    return decode_file(path, options, watch, &PackDecoder::run);
 }
 
 Result<StoredPreviews> read_previews(const std::string& path)
 {
-    Result<LoadedPack> pack = decode_file(path, {}, &PackDecoder::run_previews);
+    Result<LoadedPack> pack = decode_file(path, {}, LoadWatch{}, &PackDecoder::run_previews);
     if (!pack.ok())
         return pack.error();
     return StoredPreviews{std::move(pack->image.preview_256_png), std::move(pack->image.preview_512_png)};
@@ -576,14 +652,20 @@ Result<StoredPreviews> read_previews(const std::string& path)
 
 Result<LoadedPack> decode_pack(std::span<const std::byte> bytes, const ReadOptions& options)
 {
-    return decode(ByteSource(bytes), "", options, &PackDecoder::run);
+    return decode_pack(bytes, options, LoadWatch{});
+}
+
+Result<LoadedPack> decode_pack(std::span<const std::byte> bytes, const ReadOptions& options, const LoadWatch& watch)
+{
+    return decode(ByteSource(bytes), "", options, watch, &PackDecoder::run);
 }
 
 std::vector<Finding> validate_pack(std::span<const std::byte> bytes)
 {
     const ByteSource source(bytes);
     const ReadOptions options;
-    PackDecoder decoder(source, options, true);
+    const LoadWatch nobody;
+    PackDecoder decoder(source, options, nobody, true);
     decoder.run();
     return decoder.findings;
 }

@@ -1,6 +1,7 @@
 // The checks on decoded arrays. After them no index leaves its array, no walk is endless and no number is NaN or
 // infinite. SPEC.md, "What a reader checks", says the same in words; findings 32xx are these.
 #include "format/affine.h"
+#include "format/load_watch.h"
 #include "format/pack_file.h"
 #include "format/pack_reader.h"
 #include "format/trim_texture.h"
@@ -101,7 +102,8 @@ bool is_text(std::string_view s)
 
 class ImageValidator {
 public:
-    explicit ImageValidator(const PackImage& image) : image_(image)
+    ImageValidator(const PackImage& image, const std::function<bool()>& cancelled)
+        : image_(image), cancelled_(cancelled)
     {
         has_derived_ = !image.compact || !image.leaves.empty() || !image.part_nodes.empty() ||
                        !image.top_nodes.empty() || !image.cells.empty() || !image.sdf_words.empty();
@@ -112,22 +114,52 @@ public:
         check_sizes();
         if (!report_.empty())
             return report_.findings();
+        check_frame();
+        check_patches();
+        check_control_points();
+        check_trims();
+        check_derived();
+        return report_.findings();
+    }
+
+    /// Without what an outline lacks.
+    std::vector<Finding> run_on_outline()
+    {
+        check_sizes();
+        if (!report_.empty())
+            return report_.findings();
+        check_frame();
+        check_patches();
+        check_derived();
+        return report_.findings();
+    }
+
+private:
+    /// Asked with the number of each record; looked at every so many.
+    bool is_given_up(size_t record) const
+    {
+        constexpr size_t kStep = 4096;
+        return record % kStep == 0 && cancelled_ && cancelled_();
+    }
+
+    void check_frame()
+    {
         check_facts();
         check_strings();
         check_assembly();
         check_parts();
         check_faces();
-        check_patches();
-        check_trims();
-        if (has_derived_ && report_.empty()) {
-            check_leaves();
-            check_part_trees();
-            check_top_tree();
-        }
-        return report_.findings();
     }
 
-private:
+    void check_derived()
+    {
+        if (!has_derived_ || !report_.empty())
+            return;
+        check_leaves();
+        check_part_trees();
+        check_top_tree();
+    }
+
     void check_sizes()
     {
         for_each_array(image_, [&](std::string_view id, bool, const auto& array) {
@@ -247,7 +279,7 @@ private:
     void check_faces()
     {
         uint64_t patch = 0;
-        for (size_t i = 0; i < image_.faces.size(); ++i) {
+        for (size_t i = 0; i < image_.faces.size() && !is_given_up(i); ++i) {
             const FaceRecord& f = image_.faces[i];
             if (f.part >= image_.parts.size() || i - image_.parts[f.part].first_face >= image_.parts[f.part].face_count)
                 report_.add(3209, "FACE", fmt::format("face {} of part {}", i, f.part));
@@ -284,7 +316,7 @@ private:
 
     void check_patches()
     {
-        for (size_t i = 0; i < image_.patches.size(); ++i) {
+        for (size_t i = 0; i < image_.patches.size() && !is_given_up(i); ++i) {
             const PatchRecord& p = image_.patches[i];
             if (p.face >= image_.faces.size() ||
                 i - image_.faces[p.face].first_patch >= image_.faces[p.face].patch_count)
@@ -300,8 +332,22 @@ private:
                 report_.add(3214, "PTCH", fmt::format("patch {}", i));
             check_shape(p, i);
         }
+    }
+
+    void check_control_points()
+    {
         if (!std::all_of(image_.control_points.begin(), image_.control_points.end(), is_sane))
             report_.add(3202, "CTRL", "a control point is not finite");
+        for (size_t i = 0; i < image_.patches.size() && !is_given_up(i); ++i)
+            if (has_net(image_.patches[i]))
+                check_net(image_.patches[i], i);
+    }
+
+    static bool has_net(const PatchRecord& p)
+    {
+        const auto is_degree = [](uint degree) { return degree >= 1 && degree <= kMaxDegree; };
+        return (p.shape & 0xff) == kKindBezier && p.shape >> 25 == 0 && is_degree(p.shape >> 8 & 0xff) &&
+               is_degree(p.shape >> 16 & 0xff);
     }
 
     static bool is_rotation(const PatchRecord& p)
@@ -314,7 +360,6 @@ private:
     void check_shape(const PatchRecord& p, size_t i)
     {
         const uint kind = p.shape & 0xff, degree_u = p.shape >> 8 & 0xff, degree_v = p.shape >> 16 & 0xff;
-        const bool rational = (p.shape & kShapeRational) != 0;
         if (kind >= kSurfaceKindCount || p.shape >> 25 != 0) {
             report_.add(3215, "PTCH", fmt::format("patch {}: shape {:#x}", i, p.shape));
             return;
@@ -329,10 +374,14 @@ private:
         }
         if (!(p.param[0] >= 0 && p.param[1] >= 0))
             report_.add(3216, "PTCH", fmt::format("patch {}: roundings {} {}", i, p.param[0], p.param[1]));
-        if (degree_u == 0 || degree_u > kMaxDegree || degree_v == 0 || degree_v > kMaxDegree) {
+        if (!has_net(p))
             report_.add(3217, "PTCH", fmt::format("patch {}: degrees {} {}", i, degree_u, degree_v));
-            return;
-        }
+    }
+
+    void check_net(const PatchRecord& p, size_t i)
+    {
+        const uint degree_u = p.shape >> 8 & 0xff, degree_v = p.shape >> 16 & 0xff;
+        const bool rational = (p.shape & kShapeRational) != 0;
         const uint64_t points = uint64_t{degree_u + 1} * (degree_v + 1);
         if (!is_range_inside(p.first_control_point, points * (rational ? 4 : 3), image_.control_points.size())) {
             report_.add(3218, "PTCH",
@@ -354,7 +403,7 @@ private:
         for (const CellEntry& entry : image_.cell_entries)
             if (!(entry.eta >= -1 && entry.eta <= kTrimControlHi))
                 report_.add(3220, "CENT", fmt::format("crossing at {}", entry.eta));
-        for (size_t i = 0; i < image_.faces.size(); ++i) {
+        for (size_t i = 0; i < image_.faces.size() && !is_given_up(0); ++i) {
             const FaceRecord& f = image_.faces[i];
             if (!is_range_inside(f.first_point, f.point_count, image_.trim_points.size() / 2) ||
                 !is_range_inside(f.first_piece, f.piece_count, image_.trim_pieces.size())) {
@@ -450,6 +499,8 @@ private:
             const PartRecord& p = image_.parts[part];
             for (size_t i = p.first_leaf; i < size_t{p.first_leaf} + p.leaf_count; ++i) {
                 const LeafRecord& leaf = image_.leaves[i];
+                if (is_given_up(i))
+                    return;
                 if (leaf.patch < p.first_patch || leaf.patch - p.first_patch >= p.patch_count)
                     report_.add(3209, "LEAF", fmt::format("leaf {} of patch {}", i, leaf.patch));
                 const uint u_lo = leaf.uv_lo & 0xffff, v_lo = leaf.uv_lo >> 16;
@@ -497,6 +548,8 @@ private:
         if (!nodes.empty())
             depth[0] = 1;
         for (size_t n = 0; n < nodes.size(); ++n) {
+            if (is_given_up(n))
+                return;
             if (depth[n] == 0) {
                 report_.add(3230, section, fmt::format("{}: node {} is not reached", where, n));
                 continue;
@@ -547,6 +600,7 @@ private:
     }
 
     const PackImage& image_;
+    const std::function<bool()>& cancelled_;
     bool has_derived_ = true;
     Report report_;
 };
@@ -555,7 +609,17 @@ private:
 
 std::vector<Finding> validate_image(const PackImage& image)
 {
-    return ImageValidator(image).run();
+    return validate_image(image, {});
+}
+
+std::vector<Finding> validate_image(const PackImage& image, const std::function<bool()>& cancelled)
+{
+    return ImageValidator(image, cancelled).run();
+}
+
+bool is_valid_outline(const PackImage& image, const std::function<bool()>& cancelled)
+{
+    return ImageValidator(image, cancelled).run_on_outline().empty() && !(cancelled && cancelled());
 }
 
 } // namespace trimray

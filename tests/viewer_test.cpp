@@ -95,6 +95,20 @@ TEST(script, a_drag_is_a_press_moves_and_a_release)
     EXPECT_EQ(std::get<SaveFile>((*steps)[7]).file, "a b.png");
 }
 
+TEST(script, waits_for_what_it_says)
+{
+    const std::string file = testing::TempDir() + "waits.txt";
+    std::ofstream(file) << "wait\nwait proxy\nwait 0.5\n";
+    const Result<std::deque<ScriptStep>> steps = read_script(file);
+    ASSERT_TRUE(steps.ok());
+    ASSERT_EQ(steps->size(), 3u);
+    EXPECT_TRUE(std::holds_alternative<WaitForRest>((*steps)[0]));
+    EXPECT_TRUE(std::holds_alternative<WaitForProxy>((*steps)[1]));
+    EXPECT_EQ(std::get<WaitSeconds>((*steps)[2]).seconds, 0.5);
+    std::ofstream(file) << "wait for it\n";
+    EXPECT_FALSE(read_script(file).ok());
+}
+
 TEST(picture_size, follows_the_time_that_a_moving_picture_takes)
 {
     EXPECT_EQ(next_share(1, 20, 33), 1);            // in time: nothing is to be gained

@@ -78,6 +78,9 @@ void Interface::draw(Viewer& viewer, int width, int height)
 
 void Interface::draw_picture(Viewer& viewer)
 {
+    if (viewer.early())
+        return draw_early(viewer);
+    proxy_.clear();
     const ShownPicture* shown = viewer.shown();
     if (!shown)
         return;
@@ -93,6 +96,22 @@ void Interface::draw_picture(Viewer& viewer)
     list->AddImage(texture_of(picture_), corner_of(rect), end);
     if (!viewer.selection().empty() && selection_.texture() != 0)
         list->AddImage(texture_of(selection_), corner_of(rect), end);
+}
+
+void Interface::draw_early(Viewer& viewer)
+{
+    const PictureRect& rect = viewer.picture_rect();
+    const Status drawn =
+        proxy_.draw(viewer.early(), viewer.placed(), viewer.state(), {uint32_t(rect.width), uint32_t(rect.height)});
+    if (!drawn.ok()) {
+        viewer.tell(fmt::format("{}: {}", drawn.error().where, drawn.error().detail), true);
+        return;
+    }
+    if (!proxy_.is_drawn())
+        return;
+    ImGui::GetBackgroundDrawList()->AddImage(reinterpret_cast<ImTextureID>(static_cast<uintptr_t>(proxy_.texture())),
+                                             corner_of(rect), {float(rect.x + rect.width), float(rect.y + rect.height)},
+                                             {0, 1}, {1, 0});
 }
 
 void Interface::draw_selection(Viewer& viewer)

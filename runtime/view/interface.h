@@ -2,6 +2,7 @@
 #pragma once
 
 #include "runtime/view/gl_picture.h"
+#include "runtime/view/gl_proxy.h"
 #include "runtime/view/open_panel.h"
 #include "runtime/view/tree_panel.h"
 #include "runtime/view/viewer.h"
@@ -19,9 +20,12 @@ public:
     /// Whether the pointer, or the keys, are the interface's now: the viewer does not get them.
     bool wants_pointer() const { return wants_pointer_; }
     bool wants_keys() const { return wants_keys_; }
+    /// The first picture, drawn until there is a traced one.
+    const GlProxy& proxy() const { return proxy_; }
 
 private:
     void draw_picture(Viewer& viewer);
+    void draw_early(Viewer& viewer);
     void draw_selection(Viewer& viewer);
     void draw_toasts(Viewer& viewer);
     void draw_open(Viewer& viewer);
@@ -29,6 +33,7 @@ private:
 
     float scale_;
     GlPicture picture_, selection_;
+    GlProxy proxy_;
     uint64_t uploaded_ = 0;
     TreePanel tree_;
     OpenPanel open_;

@@ -255,7 +255,7 @@ Json report_of(const Viewer& viewer)
 /// When things were seen first, seconds since the start.
 struct Milestones {
     Clock::time_point start = Clock::now();
-    std::optional<double> window, first_picture, complete_picture;
+    std::optional<double> window, proxy, first_picture, complete_picture;
     void reach(std::optional<double>& milestone)
     {
         if (!milestone)
@@ -301,7 +301,8 @@ public:
     {
         Json report = report_of(viewer_);
         for (const auto& [name, seconds] :
-             {std::pair{"window", milestones_.window}, std::pair{"first_picture", milestones_.first_picture},
+             {std::pair{"window", milestones_.window}, std::pair{"proxy", milestones_.proxy},
+              std::pair{"first_picture", milestones_.first_picture},
               std::pair{"complete_picture", milestones_.complete_picture}})
             if (seconds)
                 report["seconds"][name] = *seconds;
@@ -316,12 +317,14 @@ private:
     {
         if (redraws_ > 0)
             return 0;
-        const double patience = viewer_.patience(now);
+        double patience = viewer_.patience(now);
+        if (const double drawing = interface_.proxy().patience(); drawing >= 0)
+            patience = patience < 0 ? drawing : std::min(patience, drawing);
         if (!plays_)
             return patience;
         const double until_step = std::max(0.0, std::chrono::duration<double>(next_step_ - now).count());
-        const bool rests = !script_.empty() && std::holds_alternative<WaitForRest>(script_.front());
-        const double wanted = rests && !viewer_.at_rest() ? patience : until_step;
+        const bool waits = !script_.empty() && is_awaited(script_.front());
+        const double wanted = waits ? patience : until_step;
         return patience < 0 ? wanted : wanted < 0 ? patience : std::min(wanted, patience);
     }
 
@@ -341,14 +344,20 @@ private:
             redraws_ = 2;
         else if (redraws_ > 0)
             --redraws_;
-        if (window_.minimised())
-            return;
+        if (!window_.minimised())
+            show(events, now);
+    }
+
+    void show(const std::vector<InputEvent>& events, Clock::time_point now)
+    {
         window_.begin_frame(events, std::chrono::duration<double>(now - last_).count());
         last_ = now;
         interface_.draw(viewer_, window_.width(), window_.height());
         window_.end_frame(wanted_pixels_);
         ++frames_;
         milestones_.reach(milestones_.window);
+        if (interface_.proxy().is_drawn())
+            milestones_.reach(milestones_.proxy);
         if (viewer_.shown())
             milestones_.reach(milestones_.first_picture);
         if (viewer_.shown() && viewer_.shown()->complete)
@@ -373,10 +382,22 @@ private:
         }
     }
 
+    /// Whether a step waits for something that is not there yet.
+    bool is_awaited(const ScriptStep& step) const
+    {
+        if (viewer_.failure())
+            return false;
+        if (std::holds_alternative<WaitForProxy>(step))
+            return !interface_.proxy().is_drawn() && (!viewer_.shown() || viewer_.loader().busy()) &&
+                   !viewer_.at_rest();
+        return std::holds_alternative<WaitForRest>(step) && !viewer_.at_rest();
+    }
+
     /// Takes the recording's next step where its time has come; its event is added to those of the window.
     Status step(std::vector<InputEvent>& events)
     {
-        if (redraws_ > 0 || Clock::now() < next_step_)
+        const bool settles = script_.empty() || !std::holds_alternative<WaitForProxy>(script_.front());
+        if ((settles && redraws_ > 0) || Clock::now() < next_step_)
             return Done{};
         if (script_.empty()) {
             if (viewer_.at_rest() || viewer_.failure())
@@ -384,8 +405,13 @@ private:
             return Done{};
         }
         const ScriptStep& next = script_.front();
-        if (std::holds_alternative<WaitForRest>(next) && !viewer_.at_rest() && !viewer_.failure())
+        if (is_awaited(next))
             return Done{};
+        if (std::holds_alternative<WaitForProxy>(next)) {
+            script_.pop_front();
+            redraws_ = 0;
+            return step(events); // before a traced picture takes its place
+        }
         if (const auto* wait = std::get_if<WaitSeconds>(&next))
             next_step_ = Clock::now() +
                          std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(wait->seconds));
@@ -414,7 +440,7 @@ private:
         }
         std::vector<unsigned char> pixels;
         wanted_pixels_ = &pixels;
-        frame({});
+        show({}, Clock::now());
         wanted_pixels_ = nullptr;
         const Picture picture{uint32_t(window_.width()), uint32_t(window_.height()), std::move(pixels)};
         const Result<std::vector<std::byte>> png = encode_png(picture);

@@ -2,6 +2,7 @@
 
 #include "runtime/command_converter.h"
 #include "runtime/view/pack_cache.h"
+#include "runtime/watched_load.h"
 
 #include <fmt/format.h>
 
@@ -43,33 +44,79 @@ ModelLoader::ModelLoader(TracerMaker make, std::function<void()> wake) : make_(s
 ModelLoader::~ModelLoader()
 {
     cancel();
+    if (thread_.joinable())
+        thread_.join();
 }
 
 void ModelLoader::start(const std::string& file)
 {
     cancel();
-    cancelled_ = false;
+    auto job = std::make_shared<Job>();
+    job->file = file;
+    {
+        const std::lock_guard lock(mutex_);
+        job_ = job;
+        progress_ = {"opening", -1};
+    }
     busy_ = true;
-    say("opening", -1);
-    thread_ = std::thread([this, file] {
-        Result<LoadedModel> loaded = load(file);
-        {
-            const std::lock_guard lock(mutex_);
-            if (!cancelled_)
-                done_ = std::move(loaded);
-        }
-        wake_();
+    // one after the other, so that a file that was given up takes nothing from the next
+    thread_ = std::thread([this, job, before = std::move(thread_)]() mutable {
+        if (before.joinable())
+            before.join();
+        run(job);
     });
 }
 
 void ModelLoader::cancel()
 {
-    cancelled_ = true;
-    if (thread_.joinable())
-        thread_.join();
     const std::lock_guard lock(mutex_);
+    if (job_)
+        job_->cancelled = true;
     done_.reset();
+    early_.reset();
     busy_ = false;
+}
+
+void ModelLoader::run(const std::shared_ptr<Job>& job)
+{
+    std::thread early;
+    Result<LoadedModel> loaded = load(job, early);
+    {
+        const std::lock_guard lock(mutex_);
+        if (!job->cancelled) {
+            if (!loaded.ok()) {
+                job->cancelled = true; // no first picture of what will not be seen
+                early_.reset();
+            }
+            done_ = std::move(loaded);
+        }
+    }
+    wake_();
+    if (early.joinable())
+        early.join();
+}
+
+void ModelLoader::publish_early(const Job& job, PackImage outline)
+{
+    if (job.cancelled)
+        return;
+    Result<ProxyMesh> mesh = decode_proxy(std::exchange(outline.proxy_draco, {}), outline.faces.size());
+    if (!mesh.ok() || mesh->triangles.empty())
+        return; // no first picture: tracing does without it
+    auto early = std::make_shared<EarlyModel>(EarlyModel{job.file, std::move(outline), std::move(*mesh)});
+    {
+        const std::lock_guard lock(mutex_);
+        if (job.cancelled)
+            return;
+        early_ = std::move(early);
+    }
+    wake_();
+}
+
+std::shared_ptr<const EarlyModel> ModelLoader::take_early()
+{
+    const std::lock_guard lock(mutex_);
+    return std::exchange(early_, nullptr);
 }
 
 LoadProgress ModelLoader::progress() const
@@ -86,17 +133,20 @@ std::optional<Result<LoadedModel>> ModelLoader::take()
     return std::exchange(done_, std::nullopt);
 }
 
-void ModelLoader::say(const std::string& doing, double share)
+void ModelLoader::say(const Job& job, const std::string& doing, double share)
 {
     {
         const std::lock_guard lock(mutex_);
+        if (job.cancelled)
+            return;
         progress_ = {doing, share};
     }
     wake_();
 }
 
-Result<std::string> ModelLoader::pack_of(const std::string& file, LoadedModel& model)
+Result<std::string> ModelLoader::pack_of(const Job& job, LoadedModel& model)
 {
+    const std::string& file = job.file;
     if (!is_cad_file(file))
         return file;
     const Result<std::string> pack = cached_pack_name(file);
@@ -109,11 +159,11 @@ Result<std::string> ModelLoader::pack_of(const std::string& file, LoadedModel& m
     }
     const auto start = Clock::now();
     const ConverterWatch watch{
-        [this](const std::string& phase, double share) { say("converting: " + phase_text(phase), share); },
-        [this] { return cancelled_.load(); }};
+        [this, &job](const std::string& phase, double share) { say(job, "converting: " + phase_text(phase), share); },
+        [&job] { return job.cancelled.load(); }};
     const Result<Json> report = run_converter(file, *pack, {}, watch);
     if (!report.ok()) {
-        if (cancelled_)
+        if (job.cancelled)
             fs::remove(*pack, failed); // it was there just before it was given up
         return report.error();
     }
@@ -124,21 +174,30 @@ Result<std::string> ModelLoader::pack_of(const std::string& file, LoadedModel& m
     return *pack;
 }
 
-Result<LoadedModel> ModelLoader::load(const std::string& file)
+Result<LoadedModel> ModelLoader::load(const std::shared_ptr<Job>& job, std::thread& early)
 {
     LoadedModel model;
-    model.file = file;
-    const Result<std::string> pack = pack_of(file, model);
+    model.file = job->file;
+    const Result<std::string> pack = pack_of(*job, model);
     if (!pack.ok())
         return pack.error();
     model.pack = *pack;
     const auto start = Clock::now();
-    say("reading the pack", -1);
-    Result<std::shared_ptr<const Scene>> scene = load_scene(*pack);
+    say(*job, "reading the pack", -1);
+    // Draco takes about as long as all the rest: beside it
+    const LoadWatch watch{[job] { return job->cancelled.load(); },
+                          [&](PackImage outline) {
+                              early = std::thread([this, job, outline = std::move(outline)]() mutable {
+                                  publish_early(*job, std::move(outline));
+                              });
+                          }};
+    Result<std::shared_ptr<const Scene>> scene = load_scene(*pack, watch);
     if (!scene.ok())
         return scene.error();
+    if (job->cancelled)
+        return given_up();
     model.scene = std::move(*scene);
-    say("getting ready to trace", -1);
+    say(*job, "getting ready to trace", -1);
     std::string note;
     Result<std::unique_ptr<Tracer>> tracer = make_(model.scene, note);
     if (!tracer.ok())

@@ -93,11 +93,21 @@ Status add_line(const std::string& line, Steps& steps)
     if (name == "drag")
         return add_drag(words, steps);
     if (name == "wait") {
-        double seconds;
-        if (words >> seconds)
-            steps.push_back(WaitSeconds{seconds});
-        else
+        std::string what;
+        if (!(words >> what)) {
             steps.push_back(WaitForRest{});
+            return Done{};
+        }
+        if (what == "proxy") {
+            steps.push_back(WaitForProxy{});
+            return Done{};
+        }
+        std::istringstream number(what);
+        number.imbue(std::locale::classic());
+        double seconds;
+        if (!(number >> seconds) || !number.eof())
+            return expected("wait, wait SECONDS or wait proxy");
+        steps.push_back(WaitSeconds{seconds});
         return Done{};
     }
     std::string rest;

@@ -2,6 +2,7 @@
 // A line is an event (input.h) or one of
 //   wait             until the picture is complete and nothing is being loaded
 //   wait SECONDS
+//   wait proxy       until the first picture, drawn from the pack's proxy, is on the screen, or a traced one
 //   click X Y        press and release the left button there; `click right X Y` another
 //   drag BUTTON X0 Y0 X1 Y1 [STEPS]     with modifiers: drag Shift+left ...
 //   key CHORD        down and up
@@ -24,6 +25,7 @@
 namespace trimray {
 
 struct WaitForRest {};
+struct WaitForProxy {};
 struct WaitSeconds {
     double seconds = 0;
 };
@@ -31,7 +33,7 @@ struct SaveFile {
     enum class What { Picture, TransparentPicture, Window, Report } what = What::Picture;
     std::string file;
 };
-using ScriptStep = std::variant<InputEvent, WaitForRest, WaitSeconds, SaveFile>;
+using ScriptStep = std::variant<InputEvent, WaitForRest, WaitForProxy, WaitSeconds, SaveFile>;
 
 /// The steps of a recording. Fails: FileNotFound, FileNotReadable; Usage at "file:line".
 Result<std::deque<ScriptStep>> read_script(const std::string& file);

@@ -32,7 +32,7 @@ bool is_inside(const ImVec2 (&quad)[4], ImVec2 p)
 
 void draw_view_cube(Viewer& viewer, float scale)
 {
-    if (!viewer.model())
+    if (!viewer.model() && !viewer.early())
         return;
     using namespace camera_math;
     const PictureRect& rect = viewer.picture_rect();

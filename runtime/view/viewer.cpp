@@ -147,6 +147,7 @@ void Viewer::follow_file()
 void Viewer::begin_load()
 {
     failure_.reset();
+    return_to_model();
     end_series("the turn is given up: another file is opened", true);
     if (const Status watched = watch_.watch(files_[file_index_]); !watched.ok())
         tell(fmt::format("{}: {}", watched.error().where, watched.error().detail));
@@ -158,10 +159,79 @@ void Viewer::begin_load()
 void Viewer::cancel_load()
 {
     loader_.cancel();
+    return_to_model();
     if (!model_)
         failure_ = Error{ErrorCode::Interrupted, files_.empty() ? "" : files_[file_index_], "opening was cancelled"};
     else
         tell("cancelled");
+}
+
+// The view at hand is that of the model again, which another file was to replace.
+void Viewer::return_to_model()
+{
+    reloaded_early_.reset();
+    if (!before_)
+        return;
+    state_.camera = before_->camera;
+    state_.look.look.arrangement = before_->arrangement;
+    framing_ = std::move(before_->framing);
+    framed_ = before_->framed;
+    before_.reset();
+    early_.reset();
+    forget_pictures();
+    dirty_ = true;
+}
+
+void Viewer::forget_pictures()
+{
+    shown_.reset();
+    hits_.reset();
+    set_selection({});
+    ++shown_count_;
+    arrangement_ = {};
+    ++arrangement_count_;
+    measured_ = {};
+}
+
+void Viewer::take_first_view()
+{
+    SceneCamera asked = std::exchange(first_camera_, std::nullopt).value_or(SceneCamera{});
+    if (!asked.eye && state_.camera.orthographic_mm > 0)
+        asked.parallel = true;
+    const auto camera = [this, asked] {
+        return camera_of(asked, placed(), visible_reach(), size().width, size().height);
+    };
+    const Result<Camera> first = camera();
+    framing_ = nullptr;
+    if (!first.ok())
+        tell(first.error().detail, true);
+    else if (asked.eye)
+        state_.camera = *first;
+    else
+        look_framed([this, camera] { return turning_about_middle(*camera(), visible_reach()); });
+}
+
+void Viewer::take_early()
+{
+    if (!has_rect_)
+        return; // as of a model
+    std::shared_ptr<const EarlyModel> early = loader_.take_early();
+    if (!early)
+        return;
+    if (loader_.busy() && keeps_view_ && model_) {
+        reloaded_early_ = std::move(early); // what is there stays until the model is
+        return;
+    }
+    early_ = std::move(early);
+    ++shown_count_;
+    if (!loader_.busy())
+        return; // the model is there, its first picture not yet
+    pictures_.cancel();
+    forget_pictures();
+    before_ = {state_.camera, state_.look.look.arrangement, std::move(framing_), framed_};
+    if (model_)
+        state_.look.look.arrangement = {}; // its names were the other model's
+    take_first_view();
 }
 
 void Viewer::take_model()
@@ -173,22 +243,22 @@ void Viewer::take_model()
         return;
     if (!done->ok()) {
         const Error& error = done->error();
+        return_to_model();
         tell(fmt::format("{}: {}", error.where, error.detail), true);
         if (!model_ || model_->file != files_[file_index_])
             failure_ = error;
         return;
     }
     const bool keeps_view = keeps_view_ && model_;
+    const bool was_early = before_.has_value();
+    before_.reset();
+    if (!was_early)
+        early_ = std::exchange(reloaded_early_, nullptr);
     pictures_.finish(); // the old tracer is let go before its scene
-    shown_.reset();
-    hits_.reset();
-    set_selection({});
+    forget_pictures();
     tree_.reset();
-    arrangement_ = {};
-    ++arrangement_count_;
-    if (model_ && !keeps_view)
+    if (model_ && !keeps_view && !was_early)
         state_.look.look.arrangement = {}; // its names were the other model's
-    measured_ = {};
     model_ = std::move(**done);
     tree_ = std::make_unique<ModelTree>(image());
     ++model_count_;
@@ -197,22 +267,8 @@ void Viewer::take_model()
     if (!recent_list_.empty())
         if (const Status kept = remember_file(recent_list_, {model_->file, model_->pack}); !kept.ok())
             tell(fmt::format("{}: {}", kept.error().where, kept.error().detail), true);
-    if (!keeps_view) {
-        SceneCamera asked = std::exchange(first_camera_, std::nullopt).value_or(SceneCamera{});
-        if (!asked.eye && state_.camera.orthographic_mm > 0)
-            asked.parallel = true;
-        const Result<Camera> camera = camera_of(asked, placed(), visible_reach(), size().width, size().height);
-        framing_ = nullptr;
-        if (!camera.ok())
-            tell(camera.error().detail, true);
-        else if (asked.eye)
-            state_.camera = *camera;
-        else
-            look_framed([this, asked] {
-                return turning_about_middle(*camera_of(asked, placed(), visible_reach(), size().width, size().height),
-                                            visible_reach());
-            });
-    }
+    if (!keeps_view && !was_early)
+        take_first_view();
     dirty_ = true;
 }
 
@@ -226,7 +282,7 @@ void Viewer::set_picture_rect(const PictureRect& rect)
     if (same_size)
         return;
     end_series("the turn is given up: the picture's size has changed", true);
-    if (model_ && framing_ && same(state_.camera, framed_))
+    if (has_view() && framing_ && same(state_.camera, framed_))
         state_.camera = framed_ = framing_();
     changed(true); // a window's border being dragged is a move
 }
@@ -281,27 +337,26 @@ void Viewer::take_picture()
     if (picture->samples == 1)
         hits_ = *picture;
     shown_ = std::move(picture);
+    early_.reset();
 }
 
 void Viewer::update(Clock::time_point now)
 {
     follow_file();
+    take_early();
     take_model();
-    if (!model_) {
-        moving_ = dirty_ = false; // there is nothing to be seen
-        std::erase_if(toasts_, [now](const Toast& toast) { return toast.until <= now; });
-        return;
-    }
-    take_picture();
     if (moving_ && now >= still_at_ && buttons_ == 0) {
         moving_ = false;
         dirty_ = true;
     }
+    std::erase_if(toasts_, [now](const Toast& toast) { return toast.until <= now; });
+    if (!model())
+        return;
+    take_picture();
     if (std::exchange(dirty_, false))
         order(moving_);
     write_pending();
     write_series();
-    std::erase_if(toasts_, [now](const Toast& toast) { return toast.until <= now; });
 }
 
 double Viewer::patience(Clock::time_point now) const
@@ -326,7 +381,7 @@ bool Viewer::at_rest() const
 
 void Viewer::save_picture(const std::string& file, bool transparent)
 {
-    if (model_ && !picture_failure_)
+    if (model() && !picture_failure_)
         pending_.push_back({file, transparent});
     else if (!save_failure_)
         save_failure_ = picture_failure_
@@ -377,7 +432,7 @@ void Viewer::write_pending()
 
 void Viewer::save_turntable(uint32_t steps)
 {
-    if (!model_ || series_)
+    if (!model() || series_)
         return;
     Series series;
     series.before = state_.camera;
@@ -458,7 +513,7 @@ void Viewer::apply_scene(const std::string& file)
     const std::vector<SceneCamera> cameras = std::exchange(scene->cameras, {});
     state_.look = std::move(*scene);
     state_.environment = std::move(environment);
-    if (!model_) { // it is for the one that comes
+    if (!has_view()) { // it is for the one that comes
         if (!cameras.empty())
             first_camera_ = cameras.front();
         return tell(fmt::format("{}: for the next model", file));
@@ -483,7 +538,7 @@ void Viewer::tell(std::string text, bool is_error)
 
 void Viewer::look_from(const std::string& view)
 {
-    if (!model_)
+    if (!has_view())
         return;
     look_framed([this, view, parallel = state_.camera.orthographic_mm > 0, fov_deg = state_.camera.fov_deg] {
         const double aspect = double(rect_.width) / rect_.height;
@@ -513,15 +568,15 @@ void Viewer::look_along(const Camera& camera)
 // Where the look at hand puts everything. What it cannot is told by the picture that is ordered.
 PlacementView Viewer::placed()
 {
-    if (const Result<bool> changed = arrangement_.change_to(image(), state_.look.look.arrangement);
+    if (const Result<bool> changed = arrangement_.change_to(outline(), state_.look.look.arrangement);
         changed.ok() && *changed)
         ++arrangement_count_;
-    return arrangement_.view(image());
+    return arrangement_.view(outline());
 }
 
 size_t Viewer::hidden_count() const
 {
-    if (!model_)
+    if (!model())
         return 0;
     const PlacementView view = arrangement_.view(image());
     return view.instances.size() - view.visible_count();
@@ -529,7 +584,7 @@ size_t Viewer::hidden_count() const
 
 Reach Viewer::visible_reach()
 {
-    return model_reach(image(), placed());
+    return model_reach(outline(), placed());
 }
 
 void Viewer::frame(std::function<Reach()> reach)
@@ -585,6 +640,8 @@ std::optional<PickedPoint> Viewer::hovered() const
 std::array<double, 3> Viewer::point_under(double x, double y) const
 {
     const auto [px, py] = in_picture(x, y);
+    if (!model())
+        return point_at_target(state_.camera, px, py, size());
     if (state_.look.look.arrangement.any() || !state_.look.look.section.planes.empty()) { // one ray meets all there is
         if (const std::optional<PickedPoint> picked = pick(x, y))
             return picked->point_mm;
@@ -722,7 +779,7 @@ void Viewer::handle(const InputEvent& event)
     case Kind::Move:
         if (buttons_ != 0 && std::hypot(event.x - press_x_, event.y - press_y_) > kClickPixels)
             dragged_ = true;
-        if (buttons_ != 0 && dragged_ && model_)
+        if (buttons_ != 0 && dragged_ && has_view())
             drag_to(event.x, event.y);
         pointer_x_ = event.x;
         pointer_y_ = event.y;
@@ -736,7 +793,7 @@ void Viewer::handle(const InputEvent& event)
                 press_x_ = pointer_x_;
                 press_y_ = pointer_y_;
                 dragged_ = false;
-                if (model_)
+                if (has_view())
                     zoom_point_ = point_under(pointer_x_, pointer_y_);
             }
             buttons_ |= 1u << event.code;
@@ -750,7 +807,7 @@ void Viewer::handle(const InputEvent& event)
         }
         break;
     case Kind::Scroll:
-        if (model_ && event.y != 0)
+        if (has_view() && event.y != 0)
             zoom_at(pointer_x_, pointer_y_, std::pow(kZoomStep, event.y));
         break;
     case Kind::Key:
@@ -831,7 +888,7 @@ void Viewer::act(Action action)
     default:
         break;
     }
-    if (!model_)
+    if (!has_view())
         return;
     switch (action) {
     case Action::Fit:
@@ -849,6 +906,8 @@ void Viewer::act(Action action)
         return look_along(roll(state_.camera, 90));
     case Action::Screenshot:
     case Action::ScreenshotTransparent: {
+        if (!model())
+            return tell("there is no picture yet");
         const std::string stem = free_stem(screenshot_folder_, fs::path(model_->file).stem().string() + "-", ".png");
         return save_picture(stem + ".png", action == Action::ScreenshotTransparent);
     }
@@ -884,7 +943,7 @@ void Viewer::act(Action action)
         if (look.look.section.planes.empty()) {
             SectionPlane plane; // through the middle, what is nearer is cut away
             for (size_t axis = 0; axis < 3; ++axis)
-                plane.point_mm[axis] = 0.5 * (image().bounds_lo_mm[axis] + image().bounds_hi_mm[axis]);
+                plane.point_mm[axis] = 0.5 * (outline().bounds_lo_mm[axis] + outline().bounds_hi_mm[axis]);
             plane.normal = {0, -1, 0};
             look.look.section.planes = {plane};
         } else

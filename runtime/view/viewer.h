@@ -92,9 +92,14 @@ public:
     void save_turntable(uint32_t steps);
 
     // ---- what there is ----
-    const LoadedModel* model() const { return model_ ? &*model_ : nullptr; }
+    /// None while what is seen is the first picture of a file that is still being read.
+    const LoadedModel* model() const { return model_ && !before_ ? &*model_ : nullptr; }
     /// Counts up with each model that takes the place of another.
     uint64_t model_count() const { return model_count_; }
+    /// What is to be drawn in place of a picture, as long as there is none.
+    std::shared_ptr<const EarlyModel> early() const { return shown_ ? nullptr : early_; }
+    /// What is placed where, of the model or of what is drawn before it.
+    PlacementView placed();
     const PackImage& image() const { return model_->scene->pack.image; }
     ViewState& state() { return state_; }
     const ViewState& state() const { return state_; }
@@ -146,7 +151,13 @@ private:
     void follow_file();
     void write_series();
     void end_series(const std::string& why, bool is_error);
+    void take_early();
     void take_model();
+    void forget_pictures();
+    void take_first_view();
+    void return_to_model();
+    bool has_view() const { return model_ || before_; }
+    const PackImage& outline() const { return before_ ? early_->outline : image(); }
     void take_picture();
     void order(bool moving);
     void fail_picture(const Error& error);
@@ -160,7 +171,6 @@ private:
     void recenter(double x, double y);
     void frame(std::function<Reach()> reach);
     void look_framed(std::function<Camera()> framing);
-    PlacementView placed();
     Reach visible_reach();
     std::array<double, 2> in_picture(double x, double y) const { return {x - rect_.x, y - rect_.y}; }
     PictureSize size() const { return {uint32_t(rect_.width), uint32_t(rect_.height)}; }
@@ -177,8 +187,18 @@ private:
     std::optional<Error> failure_;
     std::optional<LoadedModel> model_;
     std::unique_ptr<const ModelTree> tree_;
-    KeptArrangement arrangement_; // of the model's placements, as the look says
     uint64_t model_count_ = 0, arrangement_count_ = 0;
+    // of the model, until its first picture, or of what is seen before it is there; of a file that is read again
+    std::shared_ptr<const EarlyModel> early_, reloaded_early_;
+    /// The model's view, to return to if the file that is seen early does not become the model.
+    struct ViewBefore {
+        Camera camera;
+        Arrangement arrangement;
+        std::function<Camera()> framing;
+        Camera framed;
+    };
+    std::optional<ViewBefore> before_; // set while a file is seen early and its model is not there: early_ is, too
+    KeptArrangement arrangement_;      // of what outline() places, as the look says
 
     // The last view that framed something, and how: while nobody moves away from it, it is framed anew for each size
     std::function<Camera()> framing_;

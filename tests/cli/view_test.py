@@ -47,11 +47,11 @@ class View(CliTest):
         self.folder.mkdir()
         self.cache = self.folder / "cache"  # drivers keep theirs in it too
 
-    def view(self, script, *arguments, files=(PACK,), size="640x480", timeout=120 * SLOW):
+    def view(self, script, *arguments, files=(PACK,), size="640x480", timeout=120 * SLOW, device="cpu"):
         """Plays the lines and gives the report; the process, if it failed."""
         recording = self.folder / "script.txt"
         recording.write_text(script)
-        done = run("view", *files, "--play", recording, "--json", "--size", size, "--device", "cpu", *arguments,
+        done = run("view", *files, "--play", recording, "--json", "--size", size, "--device", device, *arguments,
                    env=dict(os.environ, DISPLAY=self.display, XDG_CACHE_HOME=str(self.cache)), cwd=self.folder,
                    timeout=timeout)
         if done.returncode != 0:
@@ -74,6 +74,45 @@ class View(CliTest):
         self.assertEqual(len(pictures), 4)
         self.assertTrue(report["picture"]["complete"])
         self.assertGreater(report["camera"]["height_mm"], 0)
+
+    def both_pictures(self, script, *arguments):
+        """Pixels of the first picture, from the proxy, and of the traced one in its place: lists of RGB, without what
+        panels cover. A tracer whose shaders are compiled anew leaves the time to see the first."""
+        if not OPTIONS.has_pack:
+            self.skipTest("the golden pack's proxy is none")
+        if run("render", PACK, "-o", self.folder / "any.png", "--size", "16x16", "--device", "vulkan").returncode != 0:
+            self.skipTest("no Vulkan driver, so no shaders to wait for")
+        report = self.view(f"wait proxy\n{script}window first.png\nreport first.json\nwait\nwindow traced.png\n",
+                           "--plain", *arguments, device="vulkan")
+        first = json.loads((self.folder / "first.json").read_text())
+        self.assertNotIn("picture", first, "the traced picture was there already")
+        self.assertTrue(report["picture"]["complete"])
+        self.assertLess(report["seconds"]["proxy"], report["seconds"]["first_picture"])
+        self.assertEqual(first["camera"], report["camera"])
+        pictures = []
+        for name in ["first.png", "traced.png"]:
+            width, height, rows = read_png(self.folder / name)
+            pictures.append([row[4 * x : 4 * x + 3] for y, row in enumerate(rows[: height - 110])
+                             for x in range(width) if x < width - 120 or y > 120])  # the cube of views
+        return pictures
+
+    def assert_same_place(self, first, traced):
+        background = first[0]
+        self.assertEqual(background, traced[0])
+        only_one = sum((a == background) != (b == background) for a, b in zip(first, traced))
+        both = [(a, b) for a, b in zip(first, traced) if a != background and b != background]
+        self.assertGreater(len(both), 0.05 * len(first))
+        # half a pixel along outlines, and what chords cut off arcs
+        self.assertLess(only_one, 0.02 * (len(both) + only_one))
+        # the same colours under the same light; triangles are flat, and small ones may lie before another
+        off = sum(max(abs(x - y) for x, y in zip(a, b)) > 24 for a, b in both)
+        self.assertLess(off, 0.1 * len(both))
+
+    def test_the_first_picture_is_where_the_traced_one_will_be(self):
+        self.assert_same_place(*self.both_pictures(""))
+
+    def test_the_first_picture_turns_and_may_have_parallel_rays(self):
+        self.assert_same_place(*self.both_pictures("drag left 300 200 380 260\nscroll 0 2\nkey 5\n"))
 
     def test_each_presets_mouse_turns_and_moves(self):
         moves = {"f3d": ("drag left", "drag middle"), "cad": ("drag Shift+right", "drag Ctrl+right"),
