@@ -1,6 +1,6 @@
 // Files -> the kernel's documents: format detection, readers, units, and the kernel's global settings put back after.
-#include "preprocess/import/cad_import_kernel.h"
 #include "format/cad_names.h"
+#include "preprocess/import/cad_import_kernel.h"
 
 #include <APIHeaderSection_MakeHeader.hxx>
 #include <BRepTools.hxx>
