@@ -48,6 +48,10 @@ enum class Action {
     ToggleTree,
     ToggleLook,
     ToggleStatus,
+    ToggleCosts,
+    TimeEffects,
+    DrawAccuracyCurve,
+    ToggleErrors,
     ToggleTimes,
     ToggleCheatSheet,
     // files

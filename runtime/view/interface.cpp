@@ -65,6 +65,9 @@ void Interface::draw(Viewer& viewer, int width, int height)
     if (panels.status)
         draw_status_line(viewer, width, height, scale_);
     draw_view_cube(viewer, scale_);
+    draw_legend_panel(viewer, scale_);
+    if (panels.costs)
+        draw_costs_panel(viewer, scale_);
     if (panels.times && !panels.look)
         draw_times_panel(viewer, scale_);
     draw_toasts(viewer);
@@ -96,6 +99,13 @@ void Interface::draw_picture(Viewer& viewer)
     list->AddImage(texture_of(picture_), corner_of(rect), end);
     if (!viewer.selection().empty() && selection_.texture() != 0)
         list->AddImage(texture_of(selection_), corner_of(rect), end);
+    if (const ErrorMask* errors = viewer.errors()) {
+        if (errors != drawn_errors_ || viewer.shown_count() != drawn_errors_count_)
+            errors_.set(errors->overlay, false);
+        drawn_errors_ = errors;
+        drawn_errors_count_ = viewer.shown_count();
+        list->AddImage(texture_of(errors_), corner_of(rect), end);
+    }
 }
 
 void Interface::draw_early(Viewer& viewer)

@@ -32,7 +32,9 @@ private:
     void draw_progress(Viewer& viewer);
 
     float scale_;
-    GlPicture picture_, selection_;
+    GlPicture picture_, selection_, errors_;
+    const ErrorMask* drawn_errors_ = nullptr;
+    uint64_t drawn_errors_count_ = 0;
     GlProxy proxy_;
     uint64_t uploaded_ = 0;
     TreePanel tree_;

@@ -244,6 +244,23 @@ Json report_of(const Viewer& viewer)
         for (const Dimension& dimension : dimensions)
             measures.push_back({{"name", name_of(dimension.kind)}, {"value", dimension.value}});
     }
+    if (const auto& costs = viewer.effect_costs()) {
+        report["effects"] = {{"picture_ms", costs->found.picture_ms}, {"of_this_view", viewer.is_of_this_view(*costs)}};
+        for (const EffectCost& effect : costs->found.effects)
+            if (effect.ms)
+                report["effects"]["ms"][effect.name] = *effect.ms;
+    }
+    if (const auto& curve = viewer.accuracy_curve()) {
+        report["accuracy"] = {{"in_double", curve->found.in_double}, {"complete", curve->complete}};
+        for (const CurvePoint& point : curve->found.points)
+            report["accuracy"]["points"].push_back(
+                {{"name", point.name}, {"ms", point.ms}, {"wrong", point.errors.wrong}, {"pareto", point.pareto}});
+    }
+    if (const ErrorMask* errors = viewer.errors())
+        report["errors"] = {{"pixels", errors->pixels},
+                            {"wrong", errors->wrong},
+                            {"other_face", errors->other_face},
+                            {"open", errors->open}};
     Json toasts = Json::array();
     for (const Toast& toast : viewer.toasts())
         toasts.push_back(toast.text);

@@ -11,6 +11,10 @@ void draw_status_line(Viewer& viewer, int width, int height, float scale);
 float status_line_height(float scale);
 
 void draw_view_cube(Viewer& viewer, float scale);
+/// What the colours of the map stand for, where one is drawn, and its value under the pointer.
+void draw_legend_panel(Viewer& viewer, float scale);
+/// What the effects and the accuracy of the view at hand cost, on request; where the picture is wrong.
+void draw_costs_panel(Viewer& viewer, float scale);
 void draw_look_panel(Viewer& viewer, float scale);
 void draw_measure_panel(Viewer& viewer, float scale);
 void draw_times_panel(Viewer& viewer, float scale);

@@ -98,7 +98,7 @@ Viewer::Viewer(Start start)
       turning_(preset_->turning), wake_(std::move(start.wake)), screenshot_folder_(std::move(start.screenshot_folder)),
       recent_list_(start.state_folder.empty() ? "" : start.state_folder + "/recent.json"),
       first_camera_(std::move(start.camera)), watch_(wake_), loader_(std::move(start.make_tracer), wake_),
-      pictures_(wake_)
+      pictures_(wake_), study_(wake_)
 {
     if (!start.files.empty())
         open(std::move(start.files));
@@ -254,6 +254,7 @@ void Viewer::take_model()
     before_.reset();
     if (!was_early)
         early_ = std::exchange(reloaded_early_, nullptr);
+    forget_studies();
     pictures_.finish(); // the old tracer is let go before its scene
     forget_pictures();
     tree_.reset();
@@ -353,8 +354,12 @@ void Viewer::update(Clock::time_point now)
     if (!model())
         return;
     take_picture();
-    if (std::exchange(dirty_, false))
+    take_study();
+    if (dirty_ && study_.busy())
+        study_.cancel(); // the tracer is the picture's; this is called again as soon as it is free
+    if (!study_.uses_tracer() && std::exchange(dirty_, false))
         order(moving_);
+    start_study();
     write_pending();
     write_series();
 }
@@ -374,9 +379,105 @@ double Viewer::patience(Clock::time_point now) const
 
 bool Viewer::at_rest() const
 {
-    if (!has_rect_ || loader_.busy() || moving_ || dirty_ || !pending_.empty() || series_)
+    if (!has_rect_ || loader_.busy() || moving_ || dirty_ || !pending_.empty() || series_ || study_.busy() ||
+        wanted_study_)
         return false;
     return !model_ || picture_failure_ || (shown_ && shown_->complete && shown_->order == ordered_);
+}
+
+// ---- studies -------------------------------------------------------------------------------------------------------
+
+void Viewer::study(StudyOrder::What what)
+{
+    if (model() && !series_)
+        wanted_study_ = what;
+}
+
+void Viewer::cancel_study()
+{
+    wanted_study_.reset();
+    study_.cancel();
+}
+
+void Viewer::show_errors(bool shown)
+{
+    shows_errors_ = shown;
+    asked_errors_ = 0;
+    if (!shown && study_.progress() && study_.progress()->what == StudyOrder::What::Errors)
+        study_.cancel();
+}
+
+const ErrorMask* Viewer::errors() const
+{
+    return shows_errors_ && errors_ && errors_->picture == ordered_ ? &errors_->found : nullptr;
+}
+
+// What makes two pictures of one size show the same surfaces at the same pixels.
+std::string Viewer::surfaces_seen() const
+{
+    SceneRequest seen;
+    seen.cameras = {scene_camera(state_.camera)};
+    seen.look.arrangement = state_.look.look.arrangement;
+    seen.look.section.planes = state_.look.look.section.planes;
+    return scene_text(seen);
+}
+
+void Viewer::start_study()
+{
+    if (!model() || study_.busy() || series_ || !shown_ || !shown_->complete || shown_->order != ordered_ || moving_ ||
+        dirty_ || !pending_.empty())
+        return;
+    const bool wants_errors = shows_errors_ && asked_errors_ != ordered_ && hits_ && hits_->order == ordered_;
+    if (!wanted_study_ && !wants_errors)
+        return;
+    const Result<RenderOptions> options = options_of(state_, size(), image());
+    if (!options.ok())
+        return;
+    StudyOrder order;
+    order.what = wanted_study_.value_or(StudyOrder::What::Errors);
+    order.picture = ordered_;
+    order.scene = model_->scene;
+    order.options = *options;
+    order.samples = state_.samples();
+    order.view = surfaces_seen();
+    if (std::exchange(wanted_study_, std::nullopt)) {
+        pictures_.finish(); // it has nothing to do, and lets the tracer go
+        order.tracer = model_->tracer;
+    } else {
+        asked_errors_ = ordered_;
+        order.frame = hits_->frame;
+    }
+    study_.start(std::move(order));
+}
+
+void Viewer::take_study()
+{
+    if (const std::optional<Error> error = study_.take_error())
+        tell(error->where.empty() ? error->detail : fmt::format("{}: {}", error->where, error->detail), true);
+    std::optional<StudyFindings> findings = study_.take();
+    if (!findings)
+        return;
+    ++shown_count_; // there is more to be seen
+    const auto keep = [&](auto& place, auto& found) {
+        place = {findings->picture, findings->complete, std::move(found)};
+    };
+    if (auto* const costs = std::get_if<EffectCosts>(&findings->found))
+        keep(effect_costs_, *costs);
+    else if (auto* const curve = std::get_if<AccuracyCurve>(&findings->found))
+        keep(accuracy_curve_, *curve);
+    else if (auto* const mask = std::get_if<ErrorMask>(&findings->found))
+        keep(errors_, *mask);
+}
+
+// Of another model.
+void Viewer::forget_studies()
+{
+    study_.finish();
+    wanted_study_.reset();
+    effect_costs_.reset();
+    accuracy_curve_.reset();
+    errors_.reset();
+    asked_errors_ = 0;
 }
 
 void Viewer::save_picture(const std::string& file, bool transparent)
@@ -871,6 +972,18 @@ void Viewer::act(Action action)
     case Action::ToggleStatus:
         panels.status = !panels.status;
         return;
+    case Action::ToggleCosts:
+        panels.costs = !panels.costs;
+        return;
+    case Action::TimeEffects:
+        panels.costs = true;
+        return study(StudyOrder::What::Effects);
+    case Action::DrawAccuracyCurve:
+        panels.costs = true;
+        return study(StudyOrder::What::Accuracy);
+    case Action::ToggleErrors:
+        panels.costs |= !shows_errors_;
+        return show_errors(!shows_errors_);
     case Action::ToggleTimes:
         panels.times = !panels.times;
         return;

@@ -13,6 +13,7 @@
 #include "runtime/view/selection.h"
 #include "runtime/view/surface_facts.h"
 #include "runtime/view/view_state.h"
+#include "runtime/view/view_study.h"
 #include "runtime/view/viewer_panels.h"
 
 #include <array>
@@ -43,6 +44,14 @@ struct Toast {
     std::string text;
     bool is_error = false;
     std::chrono::steady_clock::time_point until;
+};
+
+/// What a study found, and of which picture.
+template <class Found>
+struct Studied {
+    uint64_t picture = 0;
+    bool complete = false;
+    Found found;
 };
 
 class Viewer {
@@ -90,6 +99,11 @@ public:
     void apply_scene(const std::string& file);
     /// Pictures of a turn around the model, one after another, as the picture thread has them.
     void save_turntable(uint32_t steps);
+    /// Finds out what the effects or the accuracy of the view cost, once its picture is complete; a view that changes
+    /// gives it up. Of errors: of this picture and every one that follows, until told otherwise.
+    void study(StudyOrder::What what);
+    void cancel_study();
+    void show_errors(bool shown);
 
     // ---- what there is ----
     /// None while what is seen is the first picture of a file that is still being read.
@@ -140,6 +154,18 @@ public:
     const std::string& recent_list() const { return recent_list_; }
     /// How many pictures of a turn are written, and of how many; nothing: none are.
     std::optional<std::array<size_t, 2>> series_progress() const;
+    /// What the last studies of this model found. Of errors: of the picture that is shown, or nothing.
+    const std::optional<Studied<EffectCosts>>& effect_costs() const { return effect_costs_; }
+    const std::optional<Studied<AccuracyCurve>>& accuracy_curve() const { return accuracy_curve_; }
+    const ErrorMask* errors() const;
+    bool shows_errors() const { return shows_errors_; }
+    std::optional<ViewStudy::Progress> study_progress() const { return study_.progress(); }
+    /// What is found is of the picture that is ordered.
+    template <class Found>
+    bool is_of_this_view(const Studied<Found>& studied) const
+    {
+        return studied.picture == ordered_;
+    }
 
     ViewerPanels panels;
     LengthUnit unit = LengthUnit::Millimetre; // of what is told of places and measures
@@ -159,6 +185,10 @@ private:
     bool has_view() const { return model_ || before_; }
     const PackImage& outline() const { return before_ ? early_->outline : image(); }
     void take_picture();
+    void take_study();
+    void start_study();
+    void forget_studies();
+    std::string surfaces_seen() const;
     void order(bool moving);
     void fail_picture(const Error& error);
     std::string accuracy_options() const;
@@ -234,6 +264,12 @@ private:
         Camera before;
     };
     std::optional<Series> series_;
+    std::optional<Studied<EffectCosts>> effect_costs_;
+    std::optional<Studied<AccuracyCurve>> accuracy_curve_;
+    std::optional<Studied<ErrorMask>> errors_;
+    std::optional<StudyOrder::What> wanted_study_; // once the picture is complete
+    bool shows_errors_ = false;
+    uint64_t asked_errors_ = 0;            // the picture whose errors were asked for last
     bool remade_ = false;                  // the tracer of this model was made anew after its device failed
     std::optional<Error> picture_failure_; // of what is ordered
     std::optional<Error> save_failure_;
@@ -241,7 +277,8 @@ private:
 
     FileWatch watch_;
     ModelLoader loader_;
-    PictureThread pictures_; // last: all threads use what is above
+    PictureThread pictures_;
+    ViewStudy study_; // last: all threads use what is above
 };
 
 } // namespace trimray

@@ -312,6 +312,48 @@ class View(CliTest):
             self.assertEqual(picture.read_bytes(), again.read_bytes(), picture)
         self.assertNotEqual(pictures[0].read_bytes(), pictures[9].read_bytes())
 
+    def test_effects_are_timed_on_request(self):
+        report = self.view("wait\nkey Shift+E\nwait\nreport timed.json\nkey 7\nwait\n",
+                           "--occlusion", "16", size="320x240")
+        timed = json.loads((self.folder / "timed.json").read_text())["effects"]
+        self.assertTrue(timed["of_this_view"])
+        self.assertEqual(set(timed["ms"]), {"edges", "occlusion"})
+        self.assertGreater(timed["ms"]["occlusion"], 0.2 * timed["picture_ms"])  # 16 rays where there was one
+        self.assertLess(timed["ms"]["occlusion"], timed["picture_ms"])
+        self.assertEqual(report["effects"], {**timed, "of_this_view": False})
+
+    def test_the_curve_of_accuracy_is_of_the_view(self):
+        report = self.view("wait\nkey Shift+W\nwait\n", size="160x120")
+        curve = report["accuracy"]
+        self.assertTrue(curve["complete"] and curve["in_double"])
+        names = [point["name"] for point in curve["points"]]
+        self.assertEqual(names[0], "now")
+        self.assertIn("error 1 px", names)
+        self.assertIn("stochastic, 4 frames", names)
+        ms = {point["name"]: point["ms"] for point in curve["points"]}
+        self.assertGreater(ms["stochastic, 16 frames"], ms["now"])
+        self.assertTrue(any(point["pareto"] for point in curve["points"]))
+
+    def test_a_view_that_changes_gives_a_study_up(self):
+        report = self.view("wait\nkey Shift+W\nwait 0.1\ndrag left 300 200 380 260\nwait\npicture after.png\n")
+        self.assertFalse(report.get("accuracy", {}).get("complete", False))
+        self.assertEqual([m for m in report["messages"] if not m.startswith("saved")], [])
+        self.same_as_render(self.folder / "after.png", report)
+
+    def test_where_the_picture_is_wrong_is_laid_over_it(self):
+        report = self.view("wait\nwindow without.png\nkey W\nwait\nwindow with.png\nreport first.json\nkey 7\nwait\n"
+                           "report second.json\nkey W\nwait\nkey Shift+Tab\n", "--closest", "stochastic", size="320x240")
+        self.assertNotIn("errors", report)
+        _, _, without = read_png(self.folder / "without.png")
+        _, height, over = read_png(self.folder / "with.png")
+        # starts that were drawn by lot prove no pixel: all are marked as not certified
+        left = 4 * 60  # where no panel is
+        changed = sum(without[y][left - 4 : left] != over[y][left - 4 : left] for y in range(60, height - 60))
+        self.assertEqual(changed, height - 120)
+        for name in ["first", "second"]:  # each view's own
+            told = json.loads((self.folder / f"{name}.json").read_text())
+            self.assertEqual(told["errors"]["pixels"], told["picture"]["width"] * told["picture"]["height"])
+
     def test_a_scene_file_that_is_dropped_brings_its_view_back(self):
         report = self.view("wait\nkey O\ndrag left 300 200 380 260\nwait\npicture a.png\nwait\nreport a.txt\nkey 7\n"
                            f"key O\nwait\ndrop {self.folder}/a.json\nwait\npicture b.png\nwait\n")
