@@ -136,4 +136,28 @@ Camera with_perspective(const Camera& camera)
     return perspective;
 }
 
+Camera turning_about_middle(Camera camera, const Reach& reach)
+{
+    using namespace camera_math;
+    const Vec3 forward = camera_axes(camera).forward;
+    const double middle = 0.5 * (reach(forward) - reach(forward * -1)), way = middle - dot(camera.eye, forward);
+    if (way > 0)
+        camera.target = camera.eye + forward * way;
+    return camera;
+}
+
+std::optional<std::array<double, 2>> seen_at(const Camera& camera, const std::array<double, 3>& point, PictureSize size)
+{
+    using namespace camera_math;
+    const CameraAxes axes = camera_axes(camera);
+    const Vec3 way = point - camera.eye;
+    const double depth = dot(way, axes.forward);
+    const bool parallel = camera.orthographic_mm > 0;
+    const double half = parallel ? 0.5 * camera.orthographic_mm : half_height(camera.fov_deg) * depth;
+    if (!(half > 0))
+        return std::nullopt;
+    const double pixels = 0.5 * size.height / half; // a millimetre
+    return std::array{0.5 * size.width + pixels * dot(way, axes.right), 0.5 * size.height - pixels * dot(way, axes.up)};
+}
+
 } // namespace trimray

@@ -7,6 +7,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 
 namespace trimray {
 
@@ -27,6 +28,10 @@ Camera pan(const Camera& camera, double dx_px, double dy_px, PictureSize size);
 /// The point of the plane through the target, parallel to the picture, that is seen at pixel coordinates (x, y).
 std::array<double, 3> point_at_target(const Camera& camera, double x_px, double y_px, PictureSize size);
 
+/// The pixel coordinates that a point is seen at. Nothing: it is not in front of a pinhole's eye.
+std::optional<std::array<double, 2>> seen_at(const Camera& camera, const std::array<double, 3>& point,
+                                             PictureSize size);
+
 /// Comes nearer to a point, which stays where it is in the picture: all distances to it become `scale` of what they
 /// were, below 1 to come nearer. Domain: scale > 0.
 Camera zoom_about(const Camera& camera, const std::array<double, 3>& point, double scale);
@@ -38,5 +43,8 @@ Camera roll(const Camera& camera, double degrees);
 /// it is. A camera that is so already stays.
 Camera with_parallel_rays(const Camera& camera);
 Camera with_perspective(const Camera& camera);
+
+/// The camera with its target, about which it turns, in the depth of the middle of what it shows.
+Camera turning_about_middle(Camera camera, const Reach& reach);
 
 } // namespace trimray

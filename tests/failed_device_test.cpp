@@ -44,7 +44,8 @@ class FailedDeviceTest : public testing::Test {
 protected:
     void SetUp() override
     {
-        const std::string file = testing::TempDir() + "frail.tray";
+        const std::string file =
+            testing::TempDir() + testing::UnitTest::GetInstance()->current_test_info()->name() + ".tray";
         ASSERT_TRUE(write_file_atomically(file, encode_pack(synthetic_image(), WriteOptions{3})).ok());
         Viewer::Start start;
         start.files = {file};

@@ -7,6 +7,7 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <chrono>
 #include <filesystem>
 #include <fstream>
@@ -40,7 +41,9 @@ protected:
         }
         return false;
     }
-    const fs::path folder = fs::path(testing::TempDir()) / "kept";
+    // tests run side by side
+    const fs::path folder =
+        fs::path(testing::TempDir()) / testing::UnitTest::GetInstance()->current_test_info()->name();
 };
 
 TEST_F(KeptFilesTest, settings_come_back_as_they_were_written)

@@ -1,6 +1,7 @@
 #!/bin/sh
 # Installs what building and testing needs on Debian 12, builds, and passes all tests; then the tests of the format,
-# the runtime and the reading of model files once more under the address and undefined-behaviour sanitizers.
+# the runtime, the viewer and the reading of model files once more under the address and undefined-behaviour
+# sanitizers.
 # usage: [TRIMRAY_TEST_ENGINES=1] tests/run.sh    (1: installs what tests/engines.txt names as well)
 # The last line is `N passed, N failed`; the exit code is 0 only when nothing failed.
 set -eu
@@ -57,7 +58,7 @@ count_tests() {
 say "Tests"
 count_tests build
 
-say "Sanitizers: format, runtime, model files"
+say "Sanitizers: format, runtime, viewer, model files"
 cmake --preset sanitize -DTRIMRAY_PREPROCESS=OFF
 cmake --build build-sanitize -j "$jobs"
 count_tests build-sanitize

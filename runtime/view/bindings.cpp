@@ -33,6 +33,7 @@ constexpr NamedAction kActions[] = {
     {Action::ToggleXray, {"Drawing", "see through everything"}},
     {Action::CycleMap, {"Drawing", "maps: none, zebra, isophotes, curvatures, draft"}},
     {Action::ToggleSection, {"Drawing", "cut by a plane"}},
+    {Action::ToggleHandles, {"Drawing", "handles of planes that cut"}},
     {Action::TimeEffects, {"Accuracy", "time each effect of the picture"}},
     {Action::DrawAccuracyCurve, {"Accuracy", "what accuracy costs in this view"}},
     {Action::ToggleErrors, {"Accuracy", "show where the picture is wrong"}},
@@ -79,6 +80,7 @@ std::vector<KeyBinding> common_keys()
         bind("P", Action::ToggleXray),
         bind("C", Action::CycleMap),
         bind("X", Action::ToggleSection),
+        bind("Shift+X", Action::ToggleHandles),
         bind("Shift+E", Action::TimeEffects),
         bind("Shift+W", Action::DrawAccuracyCurve),
         bind("W", Action::ToggleErrors),
@@ -255,6 +257,7 @@ std::vector<CheatSheetRow> cheat_sheet(const Preset& preset)
     rows.push_back({"Mouse", "wheel", "zoom to what is under the pointer"});
     rows.push_back({"Mouse", "left click", "select a part's face"});
     rows.push_back({"Mouse", "Ctrl + left click", "select more parts, or fewer"});
+    rows.push_back({"Mouse", "left drag of a handle", "move a plane that cuts; turn it by the ball"});
     rows.push_back({"Mouse", "left double click", "turn about the point under the pointer"});
     for (const NamedAction& named : kActions)
         if (std::string keys = chords_of(preset, named.action); !keys.empty())

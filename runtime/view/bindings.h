@@ -36,6 +36,7 @@ enum class Action {
     ToggleXray,
     CycleMap,
     ToggleSection,
+    ToggleHandles,
     // parts
     HideSelection,
     IsolateSelection,

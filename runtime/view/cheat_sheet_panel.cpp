@@ -1,9 +1,26 @@
 #include "runtime/view/panels.h"
 #include "runtime/view/widgets.h"
 
+#include <algorithm>
 #include <vector>
 
 namespace trimray {
+namespace {
+
+constexpr const char* kGap = "   "; // behind what is said of a key
+
+/// Of all rows below one another.
+float column_width(const std::vector<CheatSheetRow>& rows)
+{
+    float keys = 0, what = 0;
+    for (const CheatSheetRow& row : rows) {
+        keys = std::max(keys, ImGui::CalcTextSize(row.keys.c_str()).x);
+        what = std::max(what, ImGui::CalcTextSize((row.what + kGap).c_str()).x);
+    }
+    return keys + what + 2 * ImGui::GetStyle().ItemSpacing.x;
+}
+
+} // namespace
 
 void draw_cheat_sheet(Viewer& viewer, int width, int height, float scale)
 {
@@ -20,19 +37,19 @@ void draw_cheat_sheet(Viewer& viewer, int width, int height, float scale)
             viewer.set_preset(preset);
     }
     const std::vector<CheatSheetRow> rows = cheat_sheet(viewer.preset());
-    constexpr int kColumns = 2;
-    const size_t half = (rows.size() + kColumns - 1) / kColumns;
-    if (ImGui::BeginTable("keys", 2 * kColumns, ImGuiTableFlags_SizingFixedFit)) {
-        for (size_t i = 0; i < half; ++i) {
+    const size_t columns = 2 * column_width(rows) < 0.9f * float(width) ? 2 : 1;
+    const size_t height_rows = (rows.size() + columns - 1) / columns;
+    if (ImGui::BeginTable("keys", int(2 * columns), ImGuiTableFlags_SizingFixedFit)) {
+        for (size_t i = 0; i < height_rows; ++i) {
             ImGui::TableNextRow();
-            for (size_t column = 0; column < kColumns; ++column) {
-                const size_t at = column * half + i;
+            for (size_t column = 0; column < columns; ++column) {
+                const size_t at = column * height_rows + i;
                 if (at >= rows.size())
                     continue;
                 ImGui::TableSetColumnIndex(int(2 * column));
                 ImGui::TextColored({0.55f, 0.78f, 1, 1}, "%s", rows[at].keys.c_str());
                 ImGui::TableSetColumnIndex(int(2 * column + 1));
-                text(rows[at].what + "   ");
+                text(rows[at].what + kGap);
             }
         }
         ImGui::EndTable();

@@ -146,15 +146,15 @@ void draw_curve(Viewer& viewer, const AccuracyCurve& curve)
             if (ms < ms_lo || ms > ms_hi)
                 continue;
             const ImVec2 at = place(ms, 0);
-            list->AddLine({at.x, corner.y + margin}, at, faint);
+            list->AddLine({at.x, corner.y + margin}, at, faint, hairline());
             label({at.x - 0.5f * em(), at.y + 0.2f * em()}, fmt::format("{:g}", ms));
         }
     for (int decade = int(std::ceil(std::log10(error_lo))); decade <= int(std::floor(std::log10(error_hi))); ++decade) {
         const ImVec2 at = place(ms_lo, std::pow(10, decade));
-        list->AddLine(at, {corner.x + size.x - margin, at.y}, faint);
+        list->AddLine(at, {corner.x + size.x - margin, at.y}, faint, hairline());
         label({corner.x + 0.2f * em(), at.y - 0.4f * em()}, fmt::format("1e{}", decade));
     }
-    list->AddLine(place(ms_lo, 0), place(ms_hi, 0), faint);
+    list->AddLine(place(ms_lo, 0), place(ms_hi, 0), faint, hairline());
     label({corner.x + 0.2f * em(), place(ms_lo, 0).y - 0.4f * em()}, "none");
     label({corner.x + left, corner.y + size.y - 1.1f * em()}, "ms a picture; upwards the mean error, px");
 
@@ -165,7 +165,8 @@ void draw_curve(Viewer& viewer, const AccuracyCurve& curve)
     std::sort(front.begin(), front.end(), [](const CurvePoint* a, const CurvePoint* b) { return a->ms < b->ms; });
     for (size_t i = 1; i < front.size(); ++i)
         list->AddLine(place(front[i - 1]->ms, front[i - 1]->errors.mean_error_px),
-                      place(front[i]->ms, front[i]->errors.mean_error_px), IM_COL32(110, 180, 120, 160), 1.5f);
+                      place(front[i]->ms, front[i]->errors.mean_error_px), IM_COL32(110, 180, 120, 160),
+                      1.5f * hairline());
     const CurvePoint* nearest = nullptr;
     float nearest_px = 0.9f * em();
     const ImVec2 pointer = ImGui::GetIO().MousePos;

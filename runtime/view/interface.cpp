@@ -21,8 +21,8 @@ ImVec2 corner_of(const PictureRect& rect)
 }
 
 /// What is selected, as a picture to lay over the one that is shown: placements tinted, their outline bright, the face
-/// itself brighter.
-Picture selection_overlay(const Frame& frame, const Selection& selected)
+/// itself brighter. `rim_px`: how thick the outline is.
+Picture selection_overlay(const Frame& frame, const Selection& selected, uint32_t rim_px)
 {
     Picture overlay{frame.width, frame.height, std::vector<uint8_t>(size_t(frame.width) * frame.height * 4)};
     std::vector<uint8_t> is_inside(size_t(frame.width) * frame.height);
@@ -34,8 +34,10 @@ Picture selection_overlay(const Frame& frame, const Selection& selected)
             if (!inside(x, y))
                 continue;
             const size_t at = size_t(y) * frame.width + x;
-            const bool rim = (x > 0 && !inside(x - 1, y)) || (x + 1 < frame.width && !inside(x + 1, y)) ||
-                             (y > 0 && !inside(x, y - 1)) || (y + 1 < frame.height && !inside(x, y + 1));
+            bool rim = false;
+            for (uint32_t d = 1; d <= rim_px; ++d)
+                rim |= (x >= d && !inside(x - d, y)) || (x + d < frame.width && !inside(x + d, y)) ||
+                       (y >= d && !inside(x, y - d)) || (y + d < frame.height && !inside(x, y + d));
             const bool face = selected.face && frame.face[at] == int32_t(*selected.face);
             uint8_t* const pixel = &overlay.rgba[4 * at];
             pixel[0] = 255;
@@ -58,6 +60,7 @@ void Interface::draw(Viewer& viewer, int width, int height)
     const float left = panels.tree ? tree_.draw(viewer, top, middle, 0.6f * float(width), scale_) : 0;
     viewer.set_picture_rect({int(left), int(top), width - int(left), int(middle)});
     draw_picture(viewer);
+    draw_section_handles(viewer, scale_);
     if (panels.look)
         draw_look_panel(viewer, scale_);
     if (panels.measure)
@@ -128,7 +131,7 @@ void Interface::draw_selection(Viewer& viewer)
 {
     const ShownPicture* hits = viewer.hits();
     if (!viewer.selection().empty() && hits)
-        selection_.set(selection_overlay(hits->frame, viewer.selection()), true);
+        selection_.set(selection_overlay(hits->frame, viewer.selection(), uint32_t(hairline())), true);
 }
 
 void Interface::draw_toasts(Viewer& viewer)

@@ -83,10 +83,10 @@ void draw_legend_panel(Viewer& viewer, float scale)
             list->AddRectFilledMultiColor({left, down(b.position)}, {right, down(a.position)}, color_of(b), color_of(b),
                                           color_of(a), color_of(a));
     }
-    list->AddRect({left, top}, {right, top + height}, IM_COL32(10, 12, 15, 255));
+    list->AddRect({left, top}, {right, top + height}, IM_COL32(10, 12, 15, 255), 0, 0, hairline());
     const ImU32 words = ImGui::GetColorU32(ImGuiCol_Text);
     for (const LegendLabel& tick : legend.ticks) {
-        list->AddLine({right, down(tick.position)}, {right + 0.4f * em(), down(tick.position)}, words);
+        list->AddLine({right, down(tick.position)}, {right + 0.4f * em(), down(tick.position)}, words, hairline());
         list->AddText({right + 0.6f * em(), down(tick.position) - 0.5f * em()}, words, tick.text.c_str());
     }
     for (const LegendLabel& name : legend.names)

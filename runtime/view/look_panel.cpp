@@ -1,17 +1,69 @@
+#include "runtime/camera_frame.h"
 #include "runtime/view/panels.h"
 #include "runtime/view/widgets.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
+#include <array>
 
 namespace trimray {
+namespace {
+
+/// The direction that a map is about: an axis, or that of the view at hand.
+bool edit_direction(const char* what, std::array<double, 3>& direction, const Camera& camera)
+{
+    ImGui::AlignTextToFramePadding();
+    text(what);
+    bool changed = false;
+    constexpr const char* kNames[] = {"x", "y", "z"};
+    for (size_t axis = 0; axis < 3; ++axis) {
+        std::array<double, 3> along{};
+        along[axis] = 1;
+        ImGui::SameLine();
+        if (ImGui::RadioButton(kNames[axis], direction == along)) {
+            direction = along;
+            changed = true;
+        }
+    }
+    ImGui::SameLine();
+    if (ImGui::Button("as seen")) {
+        using namespace camera_math;
+        direction = camera_axes(camera).forward * -1;
+        changed = true;
+    }
+    return changed;
+}
+
+bool edit_map(SurfaceMapLook& map, const Camera& camera)
+{
+    const bool striped = map.map == SurfaceMap::Zebra || map.map == SurfaceMap::Isophotes;
+    if (!striped && map.map != SurfaceMap::Draft)
+        return false;
+    bool changed = edit_direction(striped ? "stripes about" : "pulled along", map.direction, camera);
+    if (striped) {
+        int stripes = int(map.stripes);
+        if (ImGui::SliderInt("stripes", &stripes, 2, 64)) {
+            map.stripes = uint32_t(std::clamp(stripes, 1, 256));
+            changed = true;
+        }
+    } else {
+        constexpr double kLeast = 0, kMost = 45;
+        changed |=
+            ImGui::SliderScalar("draft angle", ImGuiDataType_Double, &map.draft_deg, &kLeast, &kMost, "%.1f deg");
+        map.draft_deg = std::clamp(map.draft_deg, kLeast, kMost);
+    }
+    return changed;
+}
+
+} // namespace
 
 void draw_look_panel(Viewer& viewer, float scale)
 {
     const PictureRect& rect = viewer.picture_rect();
     ImGui::SetNextWindowPos({float(rect.x) + 10 * scale, float(rect.y) + 10 * scale});
+    ImGui::SetNextWindowSizeConstraints({0, 0},
+                                        {float(rect.width), std::max(float(rect.height) - 20 * scale, 6 * em())});
     ImGui::SetNextWindowBgAlpha(0.92f);
     ImGui::Begin("look", nullptr, kPanel | ImGuiWindowFlags_AlwaysAutoResize);
     ImGui::PushItemWidth(12 * em());
@@ -60,43 +112,10 @@ void draw_look_panel(Viewer& viewer, float scale)
                        {SurfaceMap::CurvatureMax, "largest curvature"},
                        {SurfaceMap::CurvatureMin, "smallest curvature"},
                        {SurfaceMap::Draft, "draft"}});
+    changed |= edit_map(state.look.look.map, state.camera);
     if (viewer.model()) {
-        const PackImage& image = viewer.image();
-        bool cut = !look.look.section.planes.empty();
-        if (ImGui::Checkbox("section", &cut))
-            viewer.act(Action::ToggleSection);
-        if (!look.look.section.planes.empty()) {
-            SectionPlane& plane = look.look.section.planes.front();
-            const auto leading = [&plane] {
-                size_t axis = 0;
-                for (size_t i = 1; i < 3; ++i)
-                    if (std::abs(plane.normal[i]) > std::abs(plane.normal[axis]))
-                        axis = i;
-                return axis;
-            };
-            size_t axis = leading();
-            for (size_t i = 0; i < 3; ++i) {
-                ImGui::SameLine();
-                constexpr const char* kNames[] = {"x", "y", "z"};
-                if (ImGui::RadioButton(kNames[i], i == axis)) {
-                    plane.normal = {0, 0, 0};
-                    plane.normal[i] = -1;
-                    axis = i;
-                    changed = true;
-                }
-            }
-            ImGui::SameLine();
-            if (ImGui::Button("flip")) {
-                for (double& c : plane.normal)
-                    c = -c;
-                changed = true;
-            }
-            const double lo = image.bounds_lo_mm[axis], hi = image.bounds_hi_mm[axis];
-            changed |= ImGui::SliderScalar("at", ImGuiDataType_Double, &plane.point_mm[axis], &lo, &hi, "%.4g mm");
-            changed |= choose("caps", look.look.section.caps,
-                              {{CapStyle::None, "none"}, {CapStyle::Filled, "filled"}, {CapStyle::Hatched, "hatched"}});
-        }
-        if (image.instances.size() > 1) {
+        changed |= edit_section(viewer);
+        if (viewer.image().instances.size() > 1) {
             constexpr double kApart = 0, kFar = 3;
             changed |= ImGui::SliderScalar("apart", ImGuiDataType_Double, &look.look.arrangement.explode, &kApart,
                                            &kFar, "%.2f");

@@ -191,7 +191,7 @@ Result<Viewer::Start> understand(const Options& options, const Kept& kept)
     return start;
 }
 
-Json report_of(const Viewer& viewer)
+Json report_of(Viewer& viewer)
 {
     Json report;
     report["files"] = viewer.files();
@@ -226,6 +226,16 @@ Json report_of(const Viewer& viewer)
             report["selection"]["point"] = selection.place->point_mm;
             report["selection"]["uv"] = selection.place->uv;
         }
+    }
+    if (!viewer.state().look.look.section.planes.empty()) {
+        for (const SectionPlane& plane : viewer.state().look.look.section.planes)
+            report["section"]["planes"].push_back({{"point", plane.point_mm}, {"normal", plane.normal}});
+        const PictureRect& rect = viewer.picture_rect();
+        for (const SectionHandle& handle : viewer.section_handles())
+            report["section"]["handles"].push_back(
+                {{"plane", handle.plane},
+                 {"middle", {handle.middle_px[0] + rect.x, handle.middle_px[1] + rect.y}},
+                 {"ball", {handle.tip_px[0] + rect.x, handle.tip_px[1] + rect.y}}});
     }
     report["hidden"] = viewer.hidden_count();
     if (const std::optional<SurfaceFacts>& facts = viewer.measured().last) {
@@ -520,6 +530,7 @@ int run(int argc, char** argv)
     viewer.on_title = [&](const std::string& title) { (*window)->set_title(title + " - Trimray"); };
     viewer.panels = kept->settings.panels;
     viewer.unit = kept->settings.unit;
+    viewer.scale = (*window)->scale();
     Loop loop(**window, viewer, std::move(script), !options.play.empty(), std::move(recorder), milestones);
     const Status ran = loop.run();
     if (const Status written = keep(options, *kept, viewer, **window); !written.ok())

@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include <vector>
 
 namespace trimray {
@@ -11,6 +13,7 @@ void draw_measure_panel(Viewer& viewer, float scale)
 {
     const PictureRect& rect = viewer.picture_rect();
     ImGui::SetNextWindowPos({float(rect.x + rect.width) - 10 * scale, float(rect.y) + 8 * em()}, 0, {1, 0});
+    ImGui::SetNextWindowSizeConstraints({0, 0}, {float(rect.width), std::max(float(rect.height) - 9 * em(), 6 * em())});
     ImGui::SetNextWindowBgAlpha(0.92f);
     ImGui::Begin("measure", nullptr, kPanel | ImGuiWindowFlags_AlwaysAutoResize);
     ImGui::PushItemWidth(7 * em());

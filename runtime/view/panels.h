@@ -16,6 +16,10 @@ void draw_legend_panel(Viewer& viewer, float scale);
 /// What the effects and the accuracy of the view at hand cost, on request; where the picture is wrong.
 void draw_costs_panel(Viewer& viewer, float scale);
 void draw_look_panel(Viewer& viewer, float scale);
+/// The planes that cut, as a part of the panel at hand. True: one was changed.
+bool edit_section(Viewer& viewer);
+/// What they are moved by, over the picture.
+void draw_section_handles(Viewer& viewer, float scale);
 void draw_measure_panel(Viewer& viewer, float scale);
 void draw_times_panel(Viewer& viewer, float scale);
 void draw_cheat_sheet(Viewer& viewer, int width, int height, float scale);

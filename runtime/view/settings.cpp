@@ -20,9 +20,9 @@ namespace fs = std::filesystem;
 constexpr std::pair<LengthUnit, const char*> kUnits[] = {
     {LengthUnit::Millimetre, "mm"}, {LengthUnit::Centimetre, "cm"}, {LengthUnit::Metre, "m"}, {LengthUnit::Inch, "in"}};
 constexpr std::pair<bool ViewerPanels::*, const char*> kPanels[] = {
-    {&ViewerPanels::menu, "menu"},      {&ViewerPanels::status, "status"}, {&ViewerPanels::tree, "tree"},
-    {&ViewerPanels::look, "look"},      {&ViewerPanels::costs, "costs"},   {&ViewerPanels::times, "times"},
-    {&ViewerPanels::measure, "measure"}};
+    {&ViewerPanels::menu, "menu"},       {&ViewerPanels::status, "status"},  {&ViewerPanels::tree, "tree"},
+    {&ViewerPanels::look, "look"},       {&ViewerPanels::costs, "costs"},    {&ViewerPanels::times, "times"},
+    {&ViewerPanels::measure, "measure"}, {&ViewerPanels::handles, "handles"}};
 constexpr uint32_t kLeastWindow = 200, kMostWindow = 16384;
 
 std::string settings_file(const std::string& folder)

@@ -83,7 +83,7 @@ void TreePanel::follow(Viewer& viewer)
 
 void TreePanel::draw_search(Viewer& viewer)
 {
-    ImGui::SetNextItemWidth(-6);
+    ImGui::SetNextItemWidth(-0.4f * em());
     if (std::exchange(viewer.panels.wants_search, false))
         ImGui::SetKeyboardFocusHere();
     if (ImGui::InputTextWithHint("##search", "search", text_.data(), text_.size()))
@@ -144,7 +144,7 @@ void TreePanel::draw_row(Viewer& viewer, const TreeRow& row)
         const ImVec2 at = ImGui::GetCursorScreenPos();
         ImGui::GetWindowDrawList()->AddRectFilled({at.x, at.y + 0.15f * side},
                                                   {at.x + 0.7f * side, at.y + 0.85f * side},
-                                                  ImGui::GetColorU32(color_of(*color)), 2);
+                                                  ImGui::GetColorU32(color_of(*color)), 0.13f * em());
         ImGui::Dummy({0.7f * side, side});
         ImGui::SameLine(0, 0.4f * em());
     }

@@ -2,6 +2,7 @@
 #include "runtime/view/panels.h"
 #include "runtime/view/widgets.h"
 
+#include <algorithm>
 #include <array>
 
 namespace trimray {
@@ -86,7 +87,12 @@ void draw_view_cube(Viewer& viewer, float scale)
         const Vec3 from{-1.05, -1.05, -1.05};
         const ImVec2 a = on_screen(from), b = on_screen(from + axis.along * 2.25);
         list->AddLine(a, b, axis.color, 2 * scale);
-        list->AddText(ImGui::GetFont(), 0.85f * em(), {b.x + 2 * scale, b.y - 0.5f * em()}, axis.color, axis.name);
+        const float font = 0.85f * em();
+        const ImVec2 letter = ImGui::GetFont()->CalcTextSizeA(font, 1e9f, 0, axis.name);
+        list->AddText(ImGui::GetFont(), font,
+                      {std::clamp(b.x + 2 * scale, corner.x, corner.x + size - letter.x),
+                       std::clamp(b.y - 0.5f * em(), corner.y, corner.y + size - letter.y)},
+                      axis.color, axis.name);
     }
     ImGui::End();
     ImGui::PopStyleVar();

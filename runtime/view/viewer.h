@@ -10,6 +10,7 @@
 #include "runtime/view/model_loader.h"
 #include "runtime/view/model_tree.h"
 #include "runtime/view/picture_thread.h"
+#include "runtime/view/section_handles.h"
 #include "runtime/view/selection.h"
 #include "runtime/view/surface_facts.h"
 #include "runtime/view/view_state.h"
@@ -145,6 +146,10 @@ public:
     /// Counts up when other placements are visible, or elsewhere.
     uint64_t arrangement_count() const { return arrangement_count_; }
     std::optional<PickedPoint> hovered() const;
+    /// What planes that cut are moved by, in pixels of the picture; none where they are not to be seen.
+    std::vector<SectionHandle> section_handles();
+    /// What of them is held, or would be by a press now.
+    std::optional<GrippedSection> section_grip();
     const MeasuredPicks& measured() const { return measured_; }
     const std::vector<Toast>& toasts() const { return toasts_; }
     /// Nothing is being loaded, traced or saved, and nothing moves.
@@ -168,6 +173,7 @@ public:
     }
 
     ViewerPanels panels;
+    float scale = 1; // of what is drawn over the picture: 1 on a display of about 96 dots an inch
     LengthUnit unit = LengthUnit::Millimetre; // of what is told of places and measures
     std::function<void(const std::string& title)> on_title;
 
@@ -192,7 +198,13 @@ private:
     void order(bool moving);
     void fail_picture(const Error& error);
     std::string accuracy_options() const;
+    void save_numbered_picture(bool transparent);
     void write_pending();
+    bool act_on_window(Action action);
+    bool act_on_view(Action action);
+    bool act_on_parts(Action action);
+    bool act_on_look(Action action);
+    void drag_section_to(double x, double y);
     void drag_to(double x, double y);
     void zoom_at(double x, double y, double scale);
     std::array<double, 3> point_under(double x, double y) const;
@@ -245,6 +257,7 @@ private:
     unsigned buttons_ = 0;
     int drag_mods_ = 0;
     bool dragged_ = false;
+    std::optional<GrippedSection> grip_; // since a button was pressed
     Clock::time_point last_click_{};
     std::array<double, 3> zoom_point_{};
     Selection selection_;

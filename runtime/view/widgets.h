@@ -6,6 +6,7 @@
 #include <imgui.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <iterator>
@@ -35,6 +36,12 @@ inline ImTextureID texture_of(const GlPicture& picture)
 inline float em()
 {
     return ImGui::GetFontSize();
+}
+
+/// The thickness of a line that is as fine as can be seen well.
+inline float hairline()
+{
+    return std::max(1.0f, std::round(em() / 15));
 }
 
 /// A choice among words; true: it was changed.

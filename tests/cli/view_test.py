@@ -17,7 +17,7 @@ def start_display():
     """The process of an X server and its name."""
     reading, writing = os.pipe()
     server = subprocess.Popen(
-        ["Xvfb", "-screen", "0", "1400x1000x24", "-displayfd", str(writing)],
+        ["Xvfb", "-screen", "0", "1400x1000x24", "-noreset", "-displayfd", str(writing)],
         pass_fds=[writing], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     os.close(writing)
     with os.fdopen(reading) as pipe:
@@ -354,6 +354,47 @@ class View(CliTest):
             told = json.loads((self.folder / f"{name}.json").read_text())
             self.assertEqual(told["errors"]["pixels"], told["picture"]["width"] * told["picture"]["height"])
 
+    def test_a_plane_that_cuts_is_moved_and_turned_by_its_handle(self):
+        start = self.view("wait\nkey X\nwait\nreport r.json\nkey Shift+X\nwait\n")
+        self.assertNotIn("handles", start["section"])  # hidden
+        first = json.loads((self.folder / "r.json").read_text())
+        handle, plane = first["section"]["handles"][0], first["section"]["planes"][0]
+        (mx, my), (bx, by) = handle["middle"], handle["ball"]
+        way = [(bx - mx) / 2, (by - my) / 2]
+        arrow = f"{mx + way[0]} {my + way[1]}"
+        report = self.view(f"wait\nkey X\nwait\nwindow before.png\n"
+                           f"drag left {arrow} {mx + 1.2 * way[0]} {my + 1.2 * way[1]}\nwait\npicture moved.png\n"
+                           f"report moved.txt\n"
+                           f"drag left {bx + 0.2 * way[0]} {by + 0.2 * way[1]} {bx + 30} {by - 25}\nwait\n"
+                           f"picture turned.png\nwait\n")
+        moved = json.loads((self.folder / "moved.txt").read_text())["section"]["planes"][0]
+        self.assertEqual(moved["normal"], plane["normal"])
+        along = sum((b - a) * n for a, b, n in zip(plane["point"], moved["point"], plane["normal"]))
+        self.assertGreater(along, 0)  # to where the arrow points
+        self.assertEqual(report["camera"], first["camera"])  # the view is not turned
+        turned = report["section"]["planes"][0]
+        cosine = sum(a * b for a, b in zip(turned["normal"], moved["normal"]))
+        self.assertLess(cosine, 0.995)
+        self.assertAlmostEqual(sum(a * a for a in turned["normal"]), 1, places=9)
+        for name in ["moved", "turned"]:  # and their caps are render's
+            self.same_as_render(self.folder / f"{name}.png", report)
+        self.assertNotEqual((self.folder / "moved.png").read_bytes(), (self.folder / "turned.png").read_bytes())
+
+    def test_pictures_go_to_the_folder_for_them_and_take_no_others_place(self):
+        shots = self.folder / "shots"
+        shots.mkdir()
+        name = PACK.stem
+        (shots / f"{name}-1.png").write_bytes(b"somebody's")
+        report = self.view("wait\nkey F12\nwait\nkey F11\nwait\n", "--screenshots", shots, size="160x120")
+        self.assertEqual((shots / f"{name}-1.png").read_bytes(), b"somebody's")
+        self.assertEqual(sorted(file.name for file in shots.iterdir()),
+                         sorted(f"{name}-{end}" for end in ["1.png", "2.png", "2.json", "3.png", "3.json"]))
+        for number in [2, 3]:
+            self.same_as_render(shots / f"{name}-{number}.png", report)
+        failed = self.view("wait\nkey F12\nwait\n", "--screenshots", self.folder / "none", size="160x120")
+        self.assertEqual(failed.returncode, 2)
+        self.assertIn("none", failed.stderr)
+
     def test_a_scene_file_that_is_dropped_brings_its_view_back(self):
         report = self.view("wait\nkey O\ndrag left 300 200 380 260\nwait\npicture a.png\nwait\nreport a.txt\nkey 7\n"
                            f"key O\nwait\ndrop {self.folder}/a.json\nwait\npicture b.png\nwait\n")
@@ -365,6 +406,31 @@ class View(CliTest):
         before, after = (json.loads((self.folder / name).read_text()) for name in ["a.json", "b.json"])
         self.assertGreater(before["cpu_seconds"], 0)
         self.assertLess((after["cpu_seconds"] - before["cpu_seconds"]) / 5, 0.02)
+
+    def test_window_after_window_ends_clean(self):
+        if not OPTIONS.sanitized:
+            self.skipTest("this build does not check for leaks")
+        for _ in range(10):
+            report = self.view("wait\n", size="160x120")  # a leak ends it with an error
+            self.assertIn("picture", report)
+
+    def test_on_a_display_of_twice_the_dots_all_is_twice_as_large(self):
+        if not shutil.which("xprop"):
+            self.skipTest("no xprop: apt install x11-utils")
+        script = "wait\nkey T\nwait\nclick {} {}\nwait\nwindow {}\n"
+        once = self.view(script.format(400, 250, "once.png") + "report once.json\n", size="600x400")
+        display = dict(os.environ, DISPLAY=self.display)
+        resources = ["xprop", "-root", "-f", "RESOURCE_MANAGER", "8s"]
+        subprocess.run([*resources, "-set", "RESOURCE_MANAGER", "Xft.dpi:\t192\n"], env=display, check=True)
+        try:
+            twice = self.view(script.format(800, 500, "twice.png") + "picture p.png\nwait\n", size="600x400")
+        finally:
+            subprocess.run(["xprop", "-root", "-remove", "RESOURCE_MANAGER"], env=display, check=True)
+        self.assertEqual(read_png(self.folder / "twice.png")[:2], (1200, 800))
+        for side in ["width", "height"]:  # panels and lines of text leave the same room, but for rounding
+            self.assertAlmostEqual(twice["picture"][side] / once["picture"][side], 2, delta=0.02)
+        self.assertEqual(twice.get("selection", {}).get("face"), once.get("selection", {}).get("face"))
+        self.same_as_render(self.folder / "p.png", twice)
 
     def test_without_a_display_the_error_names_render(self):
         environment = {name: value for name, value in os.environ.items() if name not in ("DISPLAY", "WAYLAND_DISPLAY")}
