@@ -355,6 +355,8 @@ class View(CliTest):
             self.assertEqual(told["errors"]["pixels"], told["picture"]["width"] * told["picture"]["height"])
 
     def test_a_plane_that_cuts_is_moved_and_turned_by_its_handle(self):
+        if not OPTIONS.has_pack:
+            self.skipTest("the golden pack's box is not that of its faces: its handle is out of the picture")
         start = self.view("wait\nkey X\nwait\nreport r.json\nkey Shift+X\nwait\n")
         self.assertNotIn("handles", start["section"])  # hidden
         first = json.loads((self.folder / "r.json").read_text())
