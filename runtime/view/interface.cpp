@@ -4,6 +4,7 @@
 #include "runtime/view/widgets.h"
 
 #include <fmt/format.h>
+#include <imgui_internal.h>
 
 #include <algorithm>
 #include <cmath>
@@ -46,6 +47,12 @@ Picture selection_overlay(const Frame& frame, const Selection& selected, uint32_
             pixel[3] = rim ? 255 : face ? 120 : 40;
         }
     return overlay;
+}
+
+/// Whether there is nothing to see: then files are asked for.
+bool invites(const Viewer& viewer)
+{
+    return !viewer.model() && !viewer.loader().busy();
 }
 
 } // namespace
@@ -117,7 +124,7 @@ void Interface::draw_early(Viewer& viewer)
     const Status drawn =
         proxy_.draw(viewer.early(), viewer.placed(), viewer.state(), {uint32_t(rect.width), uint32_t(rect.height)});
     if (!drawn.ok()) {
-        viewer.tell(fmt::format("{}: {}", drawn.error().where, drawn.error().detail), true);
+        viewer.tell(drawn.error());
         return;
     }
     if (!proxy_.is_drawn())
@@ -136,14 +143,20 @@ void Interface::draw_selection(Viewer& viewer)
 
 void Interface::draw_toasts(Viewer& viewer)
 {
-    if (viewer.toasts().empty())
+    const bool told = viewer.failure() && invites(viewer); // by the panel that invites
+    const std::string failure = told ? words_of(*viewer.failure()) : "";
+    if (std::all_of(viewer.toasts().begin(), viewer.toasts().end(),
+                    [&failure](const Toast& toast) { return toast.text == failure; }))
         return;
     const PictureRect& rect = viewer.picture_rect();
     ImGui::SetNextWindowPos({float(rect.x) + 10 * scale_, float(rect.y + rect.height) - 10 * scale_}, 0, {0, 1});
     ImGui::SetNextWindowBgAlpha(0.8f);
     ImGui::Begin("messages", nullptr, kBare | ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoInputs);
+    ImGui::BringWindowToDisplayFront(ImGui::GetCurrentWindow()); // over a panel that was opened after them
     ImGui::PushTextWrapPos(float(rect.width) - 40 * scale_);
     for (const Toast& toast : viewer.toasts()) {
+        if (toast.text == failure)
+            continue;
         if (toast.is_error)
             ImGui::PushStyleColor(ImGuiCol_Text, ImVec4(1, 0.55f, 0.45f, 1));
         text(toast.text);
@@ -156,9 +169,8 @@ void Interface::draw_toasts(Viewer& viewer)
 
 void Interface::draw_open(Viewer& viewer)
 {
-    const bool invites = !viewer.model() && !viewer.loader().busy();
-    if (invites || viewer.panels.open)
-        open_.draw(viewer, invites, scale_);
+    if (invites(viewer) || viewer.panels.open)
+        open_.draw(viewer, invites(viewer), scale_);
     else
         open_.forget();
 }

@@ -4,8 +4,6 @@
 #include "runtime/view/pack_cache.h"
 #include "runtime/watched_load.h"
 
-#include <fmt/format.h>
-
 #include <chrono>
 #include <filesystem>
 #include <system_error>

@@ -4,8 +4,6 @@
 #include "runtime/image_io.h"
 #include "runtime/view/widgets.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <filesystem>
 #include <system_error>
@@ -51,7 +49,7 @@ void OpenPanel::list(const Viewer& viewer)
     if (!viewer.recent_list().empty()) {
         const Result<std::vector<RecentFile>> files = read_recent_files(viewer.recent_list());
         if (!files.ok())
-            failure_ = fmt::format("{}: {}", files.error().where, files.error().detail);
+            failure_ = words_of(files.error());
         else
             for (const RecentFile& file : *files)
                 recent_.push_back({file, preview_of(file.pack)});
@@ -69,7 +67,7 @@ void OpenPanel::list_folder_of(const std::string& folder)
 {
     Result<FolderListing> listing = list_folder(folder);
     if (!listing.ok()) {
-        failure_ = fmt::format("{}: {}", listing.error().where, listing.error().detail);
+        failure_ = words_of(listing.error());
         return;
     }
     failure_.clear();
@@ -98,12 +96,18 @@ void OpenPanel::draw(Viewer& viewer, bool invites, float scale)
     ImGui::SetNextWindowBgAlpha(0.96f);
     ImGui::PushStyleVar(ImGuiStyleVar_WindowPadding, {16 * scale, 12 * scale});
     ImGui::Begin("open", nullptr, kPanel);
-    text(viewer.failure() ? fmt::format("{}: {}", viewer.failure()->where, viewer.failure()->detail)
+    const ImVec2 start = ImGui::GetCursorPos();
+    const float close = ImGui::GetWindowWidth() - 7 * em();
+    ImGui::PushTextWrapPos(invites ? 0 : close - em());
+    text(viewer.failure() ? words_of(*viewer.failure())
                           : "Drop a pack (.tray), a STEP or an IGES file here, or choose one.");
+    ImGui::PopTextWrapPos();
     if (!invites) {
-        ImGui::SameLine(ImGui::GetWindowWidth() - 7 * em());
+        const float below = ImGui::GetCursorPosY();
+        ImGui::SetCursorPos({close, start.y});
         if (ImGui::Button("Close"))
             viewer.panels.open = false;
+        ImGui::SetCursorPosY(std::max(below, ImGui::GetCursorPosY()));
     }
     const bool has_recent = !recent_.empty();
     if (has_recent) {

@@ -23,6 +23,11 @@ bool same(const Camera& a, const Camera& b)
 
 } // namespace
 
+std::string words_of(const Error& error)
+{
+    return error.where.empty() ? error.detail : fmt::format("{}: {}", error.where, error.detail);
+}
+
 Viewer::Viewer(Start start)
     : state_(std::move(start.state)), preset_(start.preset ? start.preset : &presets().front()),
       turning_(preset_->turning), wake_(std::move(start.wake)), screenshot_folder_(std::move(start.screenshot_folder)),
@@ -70,7 +75,7 @@ void Viewer::order(bool moving)
 // No picture will come of what is asked for: nobody is to wait for it.
 void Viewer::fail_picture(const Error& error)
 {
-    tell(error.where.empty() ? error.detail : fmt::format("{}: {}", error.where, error.detail), true);
+    tell(error);
     picture_failure_ = error;
     if (!pending_.empty() && !save_failure_)
         save_failure_ = error;
@@ -148,6 +153,11 @@ void Viewer::tell(std::string text, bool is_error)
 {
     std::erase_if(toasts_, [&](const Toast& toast) { return toast.text == text; });
     toasts_.push_back({std::move(text), is_error, Clock::now() + (is_error ? 12s : 6s)});
+}
+
+void Viewer::tell(const Error& error)
+{
+    tell(words_of(error), true);
 }
 
 void Viewer::look_from(const std::string& view)

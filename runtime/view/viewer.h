@@ -40,6 +40,9 @@ struct MeasuredPicks {
     std::optional<PickedEdge> edge;
 };
 
+/// For people: what it concerns, if anything, and what became of it.
+std::string words_of(const Error& error);
+
 /// A message for a while, in the picture's corner.
 struct Toast {
     std::string text;
@@ -93,6 +96,7 @@ public:
     void select_face(uint32_t placement, uint32_t face);
     void show(std::span<const uint32_t> placements, bool shown);
     void tell(std::string text, bool is_error = false);
+    void tell(const Error& error);
     /// Writes the picture, once it is complete, and beside it the scene file that makes it again.
     void save_picture(const std::string& file, bool transparent);
     void cancel_load();

@@ -62,7 +62,7 @@ void Viewer::begin_load()
     return_to_model();
     end_series("the turn is given up: another file is opened", true);
     if (const Status watched = watch_.watch(files_[file_index_]); !watched.ok())
-        tell(fmt::format("{}: {}", watched.error().where, watched.error().detail));
+        tell(words_of(watched.error()));
     loader_.start(files_[file_index_]);
     if (on_title)
         on_title(fs::path(files_[file_index_]).filename().string());
@@ -156,7 +156,7 @@ void Viewer::take_model()
     if (!done->ok()) {
         const Error& error = done->error();
         return_to_model();
-        tell(fmt::format("{}: {}", error.where, error.detail), true);
+        tell(error);
         if (!model_ || model_->file != files_[file_index_])
             failure_ = error;
         return;
@@ -179,7 +179,7 @@ void Viewer::take_model()
         tell(note);
     if (!recent_list_.empty())
         if (const Status kept = remember_file(recent_list_, {model_->file, model_->pack}); !kept.ok())
-            tell(fmt::format("{}: {}", kept.error().where, kept.error().detail), true);
+            tell(kept.error());
     if (!keeps_view && !was_early)
         take_first_view();
     dirty_ = true;
@@ -189,12 +189,12 @@ void Viewer::apply_scene(const std::string& file)
 {
     Result<SceneRequest> scene = read_scene_file(file);
     if (!scene.ok())
-        return tell(fmt::format("{}: {}", scene.error().where, scene.error().detail), true);
+        return tell(scene.error());
     std::shared_ptr<const Environment> environment;
     if (scene->environment) {
         Result<Environment> read = read_environment(*scene->environment);
         if (!read.ok())
-            return tell(fmt::format("{}: {}", read.error().where, read.error().detail), true);
+            return tell(read.error());
         environment = std::make_shared<Environment>(std::move(*read));
     }
     const std::vector<SceneCamera> cameras = std::exchange(scene->cameras, {});

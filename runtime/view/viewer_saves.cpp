@@ -79,7 +79,7 @@ void Viewer::write_pending()
             written = write_file_atomically(sidecar, {bytes.begin(), bytes.end()});
         }
         if (!written.ok()) {
-            tell(fmt::format("{}: {}", written.error().where, written.error().detail), true);
+            tell(written.error());
             if (!save_failure_)
                 save_failure_ = written.error();
             continue;
@@ -114,7 +114,7 @@ void Viewer::save_turntable(uint32_t steps)
     if (const Status written = write_file_atomically(series.scene, {bytes.begin(), bytes.end()}); !written.ok()) {
         if (!save_failure_)
             save_failure_ = written.error();
-        return tell(fmt::format("{}: {}", written.error().where, written.error().detail), true);
+        return tell(written.error());
     }
     select({});
     series_ = std::move(series);
@@ -132,7 +132,7 @@ void Viewer::write_series()
     if (!written.ok()) {
         if (!save_failure_)
             save_failure_ = written.error();
-        return end_series(fmt::format("{}: {}", written.error().where, written.error().detail), true);
+        return end_series(words_of(written.error()), true);
     }
     if (++series.written < series.cameras.size())
         return look_along(series.cameras[series.written]);

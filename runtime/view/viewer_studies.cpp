@@ -3,8 +3,6 @@
 
 #include "runtime/scene_write.h"
 
-#include <fmt/format.h>
-
 #include <utility>
 #include <variant>
 
@@ -76,7 +74,7 @@ void Viewer::start_study()
 void Viewer::take_study()
 {
     if (const std::optional<Error> error = study_.take_error())
-        tell(error->where.empty() ? error->detail : fmt::format("{}: {}", error->where, error->detail), true);
+        tell(*error);
     std::optional<StudyFindings> findings = study_.take();
     if (!findings)
         return;
