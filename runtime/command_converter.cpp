@@ -215,13 +215,19 @@ Result<Json> run_converter(const std::string& model, const std::string& output, 
     return report;
 }
 
+std::string missing_faces(size_t count, size_t part, size_t face, const std::string& reason)
+{
+    if (count == 1)
+        return fmt::format("1 face is missing (face {} of part {}) because: {}", face, part, reason);
+    return fmt::format("{} faces are missing, the first (face {} of part {}) because: {}", count, face, part, reason);
+}
+
 std::vector<std::string> losses(const Json& report)
 {
     std::vector<std::string> lost;
     if (const Json& dropped = report["dropped"]; !dropped.empty())
-        lost.push_back(fmt::format("{} faces are missing, the first (face {} of part {}) because: {}", dropped.size(),
-                                   dropped[0]["face"].get<size_t>(), dropped[0]["part"].get<size_t>(),
-                                   dropped[0]["reason"].get<std::string>()));
+        lost.push_back(missing_faces(dropped.size(), dropped[0]["part"].get<size_t>(), dropped[0]["face"].get<size_t>(),
+                                     dropped[0]["reason"].get<std::string>()));
     if (report.contains("without_triangles") && !report["without_triangles"].empty())
         lost.push_back(fmt::format("{} faces have no triangles", report["without_triangles"].size()));
     for (const Json& warning : report["warnings"])

@@ -41,6 +41,9 @@ struct ConverterWatch {
 Result<Json> run_converter(const std::string& model, const std::string& output, const std::vector<std::string>& options,
                            const ConverterWatch& watch = {});
 
+/// That faces were dropped, with what is told of the first of them, for people. Domain: count > 0.
+std::string missing_faces(size_t count, size_t part, size_t face, const std::string& reason);
+
 /// What a report of trimray-pack says is not there, or doubtful: faces dropped, faces without triangles, its warnings.
 std::vector<std::string> losses(const Json& report);
 

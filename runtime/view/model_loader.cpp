@@ -1,6 +1,7 @@
 #include "runtime/view/model_loader.h"
 
 #include "runtime/command_converter.h"
+#include "runtime/pack_names.h"
 #include "runtime/view/pack_cache.h"
 #include "runtime/watched_load.h"
 
@@ -195,6 +196,12 @@ Result<LoadedModel> ModelLoader::load(const std::shared_ptr<Job>& job, std::thre
     if (job->cancelled)
         return given_up();
     model.scene = std::move(*scene);
+    const PackImage& image = model.scene->pack.image;
+    if (model.convert_seconds == 0 && !image.dropped.empty()) { // else the conversion's report has told it
+        const DroppedFace& first = image.dropped.front();
+        model.notes.push_back(
+            missing_faces(image.dropped.size(), first.part, first.face_in_part, string_at(image, first.reason)));
+    }
     say(*job, "getting ready to trace", -1);
     std::string note;
     Result<std::unique_ptr<Tracer>> tracer = make_(model.scene, note);

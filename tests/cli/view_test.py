@@ -7,7 +7,7 @@ import subprocess
 import threading
 import time
 
-from case import MODEL, OPTIONS, PACK, WORK, CliTest, run
+from case import MODEL, OPTIONS, PACK, TESTS, WORK, CliTest, run
 from pictures import read_png
 
 SLOW = 4 if OPTIONS.sanitized else 1
@@ -277,6 +277,11 @@ class View(CliTest):
         seen = [json.loads((self.folder / f"{n}.json").read_text()) for n in (1, 2)] + [seen]
         self.assertEqual([os.path.basename(report["file"]) for report in seen], ["b9.tray", "b10.tray", "a.tray"])
 
+    def test_faces_that_a_pack_has_not_are_told(self):
+        golden = sorted((TESTS / "golden").glob("*.tray"))[0]
+        report = self.view("wait\n", files=[golden], size="160x120")
+        self.assertIn("1 face is missing (face 4 of part 1) because: its domain has no area", report["messages"])
+
     def test_a_file_that_is_written_anew_is_read_again(self):
         if not OPTIONS.has_pack:
             self.skipTest("no converter in this build")
@@ -337,7 +342,7 @@ class View(CliTest):
     def test_a_view_that_changes_gives_a_study_up(self):
         report = self.view("wait\nkey Shift+W\nwait 0.1\ndrag left 300 200 380 260\nwait\npicture after.png\n")
         self.assertFalse(report.get("accuracy", {}).get("complete", False))
-        self.assertEqual([m for m in report["messages"] if not m.startswith("saved")], [])
+        self.assertEqual([m for m in report["messages"] if not m.startswith("saved") and "missing" not in m], [])
         self.same_as_render(self.folder / "after.png", report)
 
     def test_where_the_picture_is_wrong_is_laid_over_it(self):
