@@ -18,24 +18,6 @@ namespace {
 
 using namespace std::chrono_literals;
 
-/// Makes CPU tracers once it is let.
-class Gate {
-public:
-    TracerMaker maker()
-    {
-        return [this](const std::shared_ptr<const Scene>& scene, std::string&) -> Result<std::unique_ptr<Tracer>> {
-            ++asked;
-            while (!open)
-                std::this_thread::sleep_for(1ms);
-            if (fails)
-                return Error{ErrorCode::NoDevice, "gate", "closed for ever"};
-            return make_cpu_tracer(scene);
-        };
-    }
-    std::atomic<bool> open = false, fails = false;
-    std::atomic<int> asked = 0;
-};
-
 bool comes_true(const std::function<bool()>& condition)
 {
     for (int tries = 0; tries < 20000; ++tries) {
@@ -45,6 +27,24 @@ bool comes_true(const std::function<bool()>& condition)
     }
     return false;
 }
+
+/// Makes CPU tracers once it is let; after 20 s, so that a test that fails ends, too.
+class Gate {
+public:
+    TracerMaker maker()
+    {
+        return [this](const std::shared_ptr<const Scene>& scene, std::string&) -> Result<std::unique_ptr<Tracer>> {
+            ++asked;
+            comes_true([this] { return open.load(); });
+            ++let;
+            if (fails)
+                return Error{ErrorCode::NoDevice, "gate", "closed for ever"};
+            return make_cpu_tracer(scene);
+        };
+    }
+    std::atomic<bool> open = false, fails = false;
+    std::atomic<int> asked = 0, let = 0;
+};
 
 class EarlyModelTest : public testing::Test {
 protected:
@@ -133,9 +133,10 @@ TEST_F(EarlyModelTest, given_up_it_leaves_the_model_before_as_it_was)
     for (const bool fails : {false, true}) {
         gate.open = false;
         gate.fails = fails;
+        const int asked = gate.asked;
         viewer->open({second});
         EXPECT_NE(viewer->shown(), nullptr) << "the old picture stays until there is another";
-        ASSERT_TRUE(waits_for(*viewer, [&] { return viewer->early() != nullptr; }));
+        ASSERT_TRUE(waits_for(*viewer, [&] { return viewer->early() != nullptr && gate.asked > asked; }));
         EXPECT_EQ(viewer->model(), nullptr);
         EXPECT_NE(viewer->state().camera.eye, before.eye);
         if (!fails)
@@ -146,6 +147,7 @@ TEST_F(EarlyModelTest, given_up_it_leaves_the_model_before_as_it_was)
         EXPECT_EQ(viewer->early(), nullptr);
         EXPECT_EQ(viewer->state().camera.eye, before.eye);
         ASSERT_TRUE(waits_for(*viewer, [&] { return viewer->shown() != nullptr; }));
+        ASSERT_TRUE(comes_true([&] { return gate.let == gate.asked; })) << "else it is closed on what was given up";
     }
 }
 
